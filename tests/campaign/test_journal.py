@@ -42,7 +42,7 @@ def test_a_last_line_cut_anywhere_loses_only_itself(tmp_path):
 def test_a_journal_that_is_no_file_is_told_at_once(tmp_path, made):
     path = tmp_path / "j"
     os.mkfifo(path) if made == "pipe" else path.mkdir()
-    with pytest.raises(InputError, match="line 1: cannot be read"):
+    with pytest.raises(InputError, match="cannot be read: is no file"):
         journal.read_journal(path, SEED)
 
 

@@ -19,14 +19,13 @@ from kinacc.campaign.instrument import Instrument
 from kinacc.campaign.plan import Arm, Limits, Plan, Points
 from kinacc.config.names import not_in_a_line
 from kinacc.deployment.applicability import LIKE_FITTED, is_measured_there, position_std_mm
+from kinacc.deployment.folder import read_tables, robot_of
 from kinacc.deployment.planning import shortest_path
 from kinacc.deployment.record import Calibration
 from kinacc.errors import Problem, first_few, input_error, refuse
 from kinacc.geometry import compose, invert
-from kinacc.kinematics import robot as robots
 from kinacc.kinematics.inverse.limits import outside, travel_unit
 from kinacc.kinematics.model import JointState
-from kinacc.tables import store
 
 _MUCH_NOISE = 2.0  # times what the calibration left unexplained, noise included
 _MUCH_NOISE_MM = 1.0  # where nothing is known of the calibration
@@ -81,33 +80,23 @@ def points_of(
         raise input_error("candidates", message, "at least 2 different points")
     joints, names = joints[rows], [str(label[i]).strip() for i in rows]
     directions = None if directions is None else directions[rows]
-    problems = _outside(arm, joints, names)
+    robot, limits = arm.robot, (arm.robot.q_min_rad, arm.robot.q_max_rad)
+    beyond = outside(joints, limits) | outside(robot.dh_joints(joints), arm.model.domain)
+    message = f"outside the limits of {robot.name}, or the range of the data"
+    problems = [
+        Problem(f"candidates {first_few([*compress(names, far)])}", f"joint {joint} {message}")
+        for joint, far in enumerate(beyond.T, 1)
+        if far.any()
+    ]
     problems += [fault for name in names for fault in not_in_a_line("candidates, pose", name)]
     if doubled := sorted(name for name, count in Counter(names).items() if count > 1):
         message = f"names given to different joints: {', '.join(doubled[:5])}"
         problems.append(Problem("candidates", message, "one name per point"))
     refuse(problems, "These candidates cannot be measured against the model")
-    state = JointState(arm.robot.dh_joints(joints), directions)
+    state = JointState(robot.dh_joints(joints), directions)
     where = arm.pose(state, "base", point).position_mm
-    slope = arm.joint_jacobian(state, "base", point)[:, :3] @ arm.robot.joint_map
+    slope = arm.joint_jacobian(state, "base", point)[:, :3] @ robot.joint_map
     return Points(tuple(names), joints, where, slope, directions)
-
-
-def _outside(arm: Calibration, joints: np.ndarray, label: Sequence[str]) -> list[Problem]:
-    robot, domain = arm.robot, arm.model.domain
-    beyond = {
-        f"the limits of {robot.name}": outside(joints, (robot.q_min_rad, robot.q_max_rad)),
-        "the range the data cover: no prediction": outside(robot.dh_joints(joints), domain),
-    }
-    return [
-        Problem(
-            f"candidates {first_few([*compress(label, column)])}",
-            f"joint {joint} outside {what}",
-        )
-        for what, table in beyond.items()
-        for joint, column in enumerate(table.T, 1)
-        if column.any()
-    ]
 
 
 def plan_of(
@@ -254,17 +243,15 @@ def noise_doubts(
     -------
     list of Problem
     """
-    is_left = left_mm > 0.0
-    most_mm = _MUCH_NOISE * left_mm if is_left else _MUCH_NOISE_MM
-    than = f"than the {left_mm:.3g} mm that the calibration left" if is_left else "than trackers do"
+    most_mm = _MUCH_NOISE * left_mm if left_mm > 0.0 else _MUCH_NOISE_MM
     problems = []
     for device in instruments:
         where, size = f"noise of {device.name}", math.sqrt(np.trace(device.covariance_mm2))
         if size > most_mm:
-            text = f"{device.noise}: the readings would scatter more {than}"
+            text = f"{device.noise}: readings would scatter by {size:.3g} mm"
             in_mm = 1e-3 * np.sqrt(np.diag(device.covariance_mm2)).max()
             fix = f"are micrometres meant? Then it is {in_mm:g} mm. {_SURE}"
-            problems.append(Problem(where, text, "millimetres", fix))
+            problems.append(Problem(where, text, f"at most {most_mm:.3g} mm", fix))
         if known is None or known.freedom < _FEWEST_FREEDOM:
             continue
         if size / math.sqrt(3.0) < _LITTLE_NOISE * known.per_axis_mm:
@@ -279,12 +266,10 @@ def noise_doubts(
 
 def noise_of(results: Path) -> Noise | None:
     """Return the noise of the readings in a results folder; None where it has no readings."""
-    paths = [results / f"{name}.parquet" for name in ("measurements", "robot")]
-    if not all(path.is_file() for path in paths):
+    if not (results / "measurements.parquet").is_file():
         return None
-    measured, described = map(store.read, paths)
-    arm = robots.of_text(str(described["description"][0]), "robot.parquet")
-    return of_measurements(measured, arm)
+    tables = read_tables(results, needed=("measurements", "robot"), optional=())
+    return of_measurements(tables["measurements"], robot_of(tables))
 
 
 def _candidate_doubts(arm: Calibration, points: Points, point: str | None) -> list[Problem]:

@@ -20,10 +20,9 @@ def of_results(results: Path) -> list[Path]:
     They are searched beside it, beside all results, and in the working folder; each is named as a
     person there would.
     """
-    within, name = results.absolute().parent, results.resolve().name
-    near = {within.resolve(): results.parent, within.parent.resolve(): results.parent / ".."}
-    campaigns = []
-    for place in (near | {Path.cwd(): Path()}).values():
+    name, campaigns = results.resolve().name, []
+    places = (results.parent, results.parent / "..", Path())
+    for place in {place.resolve(): place for place in places}.values():
         for path in sorted(place.glob(f"*/{PLAN}")):
             # What cannot be read is no campaign, or one that cannot state whose it is.
             with suppress(InputError, OSError, ValueError, LookupError, TypeError, RecursionError):

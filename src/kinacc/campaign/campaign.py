@@ -7,7 +7,7 @@ from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Protocol
+from typing import TYPE_CHECKING
 
 import numpy as np
 import pandas as pd
@@ -21,9 +21,13 @@ from kinacc.campaign.plan import Limits, Plan, assessor_of
 from kinacc.campaign.recording import NOTHING, Recorded, read_readings, record
 from kinacc.campaign.state import LeaveOut, Reading, State, Strike
 from kinacc.campaign.status import Bound, CampaignStatus, status
-from kinacc.deployment.record import Calibration
-from kinacc.errors import InputError, Problem, input_error, refuse
+from kinacc.errors import InputError, Problem, input_error
 from kinacc.geometry import invert, numbers
+from kinacc.measurements.row_names import RowNames
+from kinacc.measurements.rows import joint_columns
+
+if TYPE_CHECKING:
+    from kinacc import api
 
 
 @dataclass(frozen=True)
@@ -41,14 +45,6 @@ class NextPose:
     expected_mm: np.ndarray
     frame: str
     times_read: int
-
-
-class CalibratedRobot(Protocol):
-    """A calibration with its model: ``kinacc.Calibration``."""
-
-    @property
-    def model(self) -> Calibration:
-        """The selected model."""
 
 
 class Campaign:
@@ -85,7 +81,7 @@ class Campaign:
 
     @classmethod
     def start(
-        cls, folder: Path | str, calibration: CalibratedRobot, candidates: ArrayLike,
+        cls, folder: Path | str, calibration: api.Calibration, candidates: ArrayLike,
         noise_mm: ArrayLike, budget: int = 200, *, point: str | None = None,
         frame: Frame = INSTRUMENT, tolerance_mm: float | None = None, seed: int = 0,
         assessor: str = RECOMMENDED, settings: Mapping[str, object] | None = None,
@@ -167,20 +163,15 @@ class Campaign:
         """Return the poses to measure now, a row each, in order.
 
         ``every``: all that are measured whatever is read; else the next one alone. Columns pose,
-        q1_deg, q1_rad (q1_mm where a joint slides) .., s1 .. (travel), expected_x_mm ...
+        q1_deg (q1_mm where a joint slides) .., s1 .. (travel), expected_x_mm ...
         """
         folders.require_method(self.opened)
         points, requested = self.plan.points, self.state.requested
         rows = self.state.ahead() if every and requested is not None else []
         if requested is not None and requested not in rows:
             rows = [requested, *rows]
-        table = pd.DataFrame({"pose": [points.label[row] for row in rows]})
-        for joint, values in enumerate(points.joints[rows].T, start=1):
-            if self.plan.slides[joint - 1]:
-                table[f"q{joint}_mm"] = values
-            else:
-                table[f"q{joint}_deg"] = np.rad2deg(values)
-                table[f"q{joint}_rad"] = values
+        joints = joint_columns(self.plan.slides, points.joints[rows])
+        table = pd.DataFrame({"pose": [points.label[row] for row in rows], **joints})
         if points.directions is not None:
             for joint, directions in enumerate(points.directions[rows].T, start=1):
                 table[f"s{joint}"] = directions
@@ -249,28 +240,26 @@ class Campaign:
         """Leave a point without readings out, for a reason that is not its error."""
         with self._writing() as opened:
             state, number = opened.state, opened.plan.points.number(point)
+            where = f"point {point}"
             if number is None:
-                raise input_error(f"point {point}", "is no candidate")
-            read, message = sum(item.reading.point == number for item in state.readings), ""
-            if read:
+                raise input_error(where, "is no candidate")
+            if read := sum(item.reading.point == number for item in state.readings):
                 message = f"has {read} readings: without it a large error could be hidden"
-            elif number in state.left_out:
-                message = "was left out before"
-            elif len(state.rows) <= 2:
-                message = "is one of the last 2 candidates"
-            _refuse(f"point {point}", message, reason)
-            opened.write(LeaveOut(point=number, reason=reason.strip()))
+                raise input_error(where, message)
+            if number in state.left_out:
+                raise input_error(where, "was left out before")
+            if len(state.rows) <= 2:
+                raise input_error(where, "is one of the last 2 candidates")
+            opened.write(LeaveOut(point=number, reason=_stated(reason)))
 
     def strike(self, number: int, reason: str) -> None:
         """Declare a reading void, for a reason that is not its size."""
         with self._writing() as opened:
-            state, message = opened.state, ""
-            if number in {item.number for item in state.struck}:
-                message = "was struck before"
-            elif not 1 <= number <= len(state.taken):
-                message = f"does not exist ({len(state.taken)} readings)"
-            _refuse(f"reading {number}", message, reason)
-            opened.write(Strike(reading=number, reason=reason.strip()))
+            known = [item.number for item in opened.state.readings]
+            if number not in known:
+                allowed = RowNames(word="reading").spans(known)
+                raise input_error(f"reading {number}", "is not there, or was struck", allowed)
+            opened.write(Strike(reading=number, reason=_stated(reason)))
 
     @contextmanager
     def _writing(self) -> Iterator[folders.Opened]:
@@ -295,7 +284,7 @@ class Campaign:
         return modelled @ back.rotation.T + back.position_mm
 
 
-def _refuse(where: str, message: str, reason: str) -> None:
-    problems = [Problem(where, message)] if message else []
-    problems += [] if reason.strip() else [Problem("--reason", "is empty")]
-    refuse(problems, "Nothing was changed")
+def _stated(reason: str) -> str:
+    if not reason.strip():
+        raise input_error("--reason", "is empty")
+    return reason.strip()

@@ -13,7 +13,7 @@ import hashlib
 import json
 import os
 from collections.abc import Iterator, Mapping
-from contextlib import ExitStack, contextmanager
+from contextlib import contextmanager
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from functools import cached_property
@@ -26,11 +26,12 @@ from kinacc.campaign.beside_results import JOURNAL, PLAN
 from kinacc.campaign.plan import Plan
 from kinacc.campaign.state import Entry, State, restore
 from kinacc.config import json_files
-from kinacc.errors import InputError, MachineError, Problem, input_error, refuse, refused
+from kinacc.errors import InputError, Problem, input_error, refuse, refused
 from kinacc.tables.atomic import synchronise, taken, write_whole
 
 LOCK = "lock"
 _PATIENCE_S = 5.0
+_UNCONFIRMED = "cannot be written, and nothing was confirmed"
 _DIGITS = 16  # of a checksum and of a digest
 
 
@@ -58,10 +59,10 @@ def read_journal(path: Path, seed: str) -> Journal:
     Raises InputError where a line cannot be read, or is not the one that was written there. Lines
     of earlier versions carry no checksum of their own (``chain``), and are taken as they are.
     """
+    if path.exists() and not path.is_file():
+        raise _damaged(str(path), "cannot be read: is no file")
     try:
-        content = path.read_bytes() if path.is_file() or not path.exists() else b"not a file\n"
-    except FileNotFoundError:
-        content = b""
+        content = path.read_bytes() if path.exists() else b""
     except OSError as error:
         raise _damaged(str(path), f"cannot be read: {error.strerror}") from None
     entries: list[Mapping[str, Any]] = []
@@ -102,7 +103,7 @@ def append(path: Path, known: Journal, entry: Mapping[str, Any]) -> None:
         if fresh:
             synchronise(path.parent)
     except OSError as error:
-        raise _not_written(path, error) from None
+        raise refused(error, path, _UNCONFIRMED) from None
 
 
 @contextmanager
@@ -111,13 +112,12 @@ def locked(folder: Path, patience_s: float = _PATIENCE_S) -> Iterator[None]:
 
     Raises InputError where another holds it for longer than ``patience_s``.
     """
-    with ExitStack() as stack:
-        try:
-            file = stack.enter_context(open(folder / LOCK, "a+"))
-            held = taken(file.fileno(), patience_s)
-        except OSError as error:
-            raise _not_written(folder / LOCK, error) from None
-        if not held:
+    try:
+        file = open(folder / LOCK, "a+")  # noqa: SIM115
+    except OSError as error:
+        raise refused(error, folder / LOCK, _UNCONFIRMED) from None
+    with file:
+        if not taken(file.fileno(), patience_s):
             message = "another process is writing to this campaign"
             fix = "wait until it is done, then try again"
             raise input_error(str(folder), message, fix=fix)
@@ -132,12 +132,6 @@ def _checksum(seed: str, number: int, entry: Mapping[str, Any]) -> str:
 def _damaged(where: str, message: str) -> InputError:
     fix = "nothing was done; bring the file back from a copy"
     return input_error(where, message, fix=fix)
-
-
-def _not_written(path: Path, error: OSError) -> MachineError:
-    fix = "nothing was confirmed: look at `kinacc campaign status` before trying again"
-    (problem,) = refused(error, path, "cannot be written").problems
-    return MachineError(Problem(problem.where, problem.what, fix=fix))
 
 
 @dataclass(frozen=True)
@@ -233,16 +227,12 @@ def marks_of(opened: Opened) -> dict[str, object]:
 
 
 def doubts(opened: Opened) -> list[str]:
-    """Return what is unusual: begun with another version, or a last line that was cut off."""
-    lines = []
-    if opened.version != __version__:
-        lines.append(f"begun with kinacc {opened.version}, this is {__version__}")
-    if opened.journal.cut_off:
-        lines.append(
-            "the last entry was cut off while written and never confirmed: is the last reading to "
-            "be recorded again?"
-        )
-    return lines
+    """Return what is unusual: a last line that was cut off."""
+    message = (
+        "the last entry was cut off while written and never confirmed: is the last reading to be "
+        "recorded again?"
+    )
+    return [message] if opened.journal.cut_off else []
 
 
 @dataclass(frozen=True)
@@ -262,6 +252,6 @@ def verify(opened: Opened, sha256: str | None = None) -> Verification:
     Checksums of the lines are checked where a journal is opened.
     """
     journal, count = opened.journal, len(opened.journal.entries)
-    readings = sum(len(entry.get("readings", ())) for entry in journal.entries)
+    readings = len(opened.state.taken)
     continues = sha256 is None or sha256 in map(journal.sha256, range(count + 1))
     return Verification(journal.seed, count, readings, journal.sha256(), continues)

@@ -95,10 +95,6 @@ class LaserTracker:
         even = (across**2 + self.repeat_mm**2)[:, None, None] * np.eye(3)
         return even + (along**2 - across**2)[:, None, None] * outer
 
-    def largest_mm(self, distance_mm: np.ndarray) -> float:
-        """Largest standard deviation in any direction at any of the distances (m,)."""
-        return float(np.hypot(np.max(self.std_mm(distance_mm)), self.repeat_mm))
-
 
 @dataclass(frozen=True)
 class Instrument:
@@ -134,9 +130,8 @@ class Instrument:
         """The instrument with the largest covariance that it has at places (m, 3) in the base."""
         if self.laser is None:
             return self
-        distance_mm = np.linalg.norm(at_mm - to_base.position_mm, axis=1)
-        covariance = self.laser.largest_mm(distance_mm) ** 2 * np.eye(3)
-        return replace(self, covariance_mm2=floored(covariance, self.resolution_mm))
+        variances_mm2 = np.linalg.eigvalsh(self.in_base(to_base, at_mm))
+        return replace(self, covariance_mm2=variances_mm2.max() * np.eye(3))
 
     def of_reading(self, std: str) -> Instrument:
         """The same instrument with the noise of one reading: 1, 3 or 9 numbers as text."""
@@ -148,13 +143,15 @@ class Instrument:
         """The noise in few words."""
         std = np.sqrt(np.diag(self.covariance_mm2))
         axes = std[:1] if np.all(std == std[0]) else std
-        parts = [f"{', '.join(f'{axis:.4g}' for axis in axes)} mm per axis"]
+        text = f"{', '.join(f'{axis:.4g}' for axis in axes)} mm per axis"
         if self.laser is not None:
             stated = (f"{name} {value:g}" for name, value in vars(self.laser).items() if value)
-            parts.append(f"less at nearer candidates (laser: {', '.join(stated)})")
-        parts += ["correlated"] if np.triu(self.covariance_mm2, 1).any() else []
-        parts += [f"read in steps of {self.resolution_mm:g} mm"] if self.resolution_mm else []
-        return ", ".join(parts)
+            text += f", less at nearer candidates (laser: {', '.join(stated)})"
+        if np.triu(self.covariance_mm2, 1).any():
+            text += ", correlated"
+        if self.resolution_mm:
+            text += f", read in steps of {self.resolution_mm:g} mm"
+        return text
 
 
 def floored(covariance_mm2: np.ndarray, resolution_mm: float) -> np.ndarray:
@@ -212,7 +209,7 @@ def _instrument(text: str, frame: Frame, resolution_mm: float) -> Instrument:
         raise input_error(where, message, "--frame instrument")
     else:
         laser = _laser(noise, where)
-        covariance = laser.largest_mm(np.zeros(1)) ** 2 * np.eye(3)
+        covariance = laser.covariance_mm2(np.zeros((1, 3)))[0]
     return Instrument(name, floored(covariance, resolution_mm), frame, laser, resolution_mm)
 
 

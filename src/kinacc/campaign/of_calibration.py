@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import shlex
+from collections import defaultdict
 from collections.abc import Iterable, Mapping
 from contextlib import suppress
 from pathlib import Path
@@ -64,20 +65,20 @@ def history(inputs: Mapping[str, Any], settings: Settings) -> Columns:
     settings : mapping
         Settings of the data set.
     """
-    campaigns = [value.parent for role, value in sorted(inputs.items()) if "/campaign_" in role]
+    calibrations = defaultdict[str, dict[str, Any]](dict)
+    campaigns = set[Path]()
+    for role, value in inputs.items():
+        if isinstance(value, Path):
+            campaigns.add(value.parent)
+        else:
+            name, _, table = role.partition("/")
+            calibrations[name][table] = value
     sessions = []
     for line in settings["series"]:
-        start = f"{line['name']}/"
-        tables = {
-            role.removeprefix(start): value
-            for role, value in inputs.items()
-            if role.startswith(start) and not isinstance(value, Path)
-        }
-        digest = store.digest_of("measurements", tables["measurements"])
-        bound_mm = finished(tables, results.selected_model(tables), campaigns)
+        tables = calibrations[line["name"]]
         facts = {
-            "digest": digest,
-            "bound_mm": bound_mm,
+            "digest": store.digest_of("measurements", tables["measurements"]),
+            "bound_mm": finished(tables, results.selected_model(tables), campaigns),
             "tolerance_mm": settings["tolerance"]["mm"],
         }
         sessions.append(
@@ -114,14 +115,11 @@ def _last_reading(place: Path) -> float:
 
 def _is_of(plan: Plan, tables: Tables) -> bool:
     """Whether the model the campaign judges is the one that the tables hold now."""
+    about, points = plan.about, plan.points
     try:
-        about = plan.about
         calibration = results.calibration(tables, about["model"], about["calibration"])
-        arm = calibration.robot
-        if len(arm.q_min_rad) != plan.points.joints.shape[1]:
-            return False
-        state = JointState(arm.dh_joints(plan.points.joints), plan.points.directions)
+        state = JointState(calibration.robot.dh_joints(points.joints), points.directions)
         modelled_mm = calibration.pose(state, "base", about["point"]).position_mm
-    except InputError:
-        return False  # the model or the target is not there any more
-    return bool(np.abs(modelled_mm - plan.points.modelled_mm).max() < _SAME_MM)
+    except (InputError, ValueError):
+        return False  # the model or the target is not there any more, or the robot is another one
+    return bool(np.abs(modelled_mm - points.modelled_mm).max() < _SAME_MM)

@@ -24,12 +24,14 @@ from pydantic import (
 
 from kinacc.assess.adaptive import AdaptiveAssessor, Candidates
 from kinacc.assess.registry import ADAPTIVE
+from kinacc.assess.statement import CANDIDATES, MEASURED, REGION
 from kinacc.campaign.instrument import Instrument, finite
 from kinacc.config import json_files
 from kinacc.config.problems import problems_of
 from kinacc.errors import InputError, Problem, input_error, refuse
 from kinacc.geometry import Pose
 
+TARGETS = (CANDIDATES, REGION, MEASURED)  # of bounds: those on all candidates stand first
 METHOD = 2  # of the bounds: raised where the same readings give other bounds
 # Settings that earlier plans state, with the defaults they had.
 _FORMER = {
@@ -77,16 +79,18 @@ class Points:
         """The points of a list of mappings, as :meth:`rows` returns them."""
         if isinstance(rows, Points):
             return rows
-        columns = {item.name: [row[item.name] for row in rows] for item in fields(cls)}
-        label, directions = tuple(map(str.strip, columns.pop("label"))), columns.pop("directions")
-        arrays = {name: finite(values) for name, values in columns.items()}
+        label = tuple(row["label"].strip() for row in rows)
+        arrays = {
+            name: finite([row[name] for row in rows]) for name in ("joints", "modelled_mm", "slope")
+        }
         count, joints = arrays["joints"].shape
         shapes = arrays["modelled_mm"].shape, arrays["slope"].shape
         if shapes != ((count, 3), (count, 3, joints)):
             raise ValueError(f"points of shapes {shapes}")
-        if directions[0] is not None:
-            arrays["directions"] = finite(directions).astype(np.int8)
-        return cls(label=label, **arrays)
+        if rows[0]["directions"] is not None:
+            directions = finite([row["directions"] for row in rows])
+            arrays["directions"] = directions.astype(np.int8)
+        return cls(label, **arrays)
 
     def rows(self) -> list[dict[str, Any]]:
         """A mapping for each point."""
@@ -101,14 +105,12 @@ class Limits:
     """What a reading must keep to be taken, and what the campaign is for (None: not stated).
 
     ``joint_rad``: largest distance of reported joints from those of the pose; ``implausible_mm``:
-    error beyond which a reading is refused, infinite where the plan is to derive it. ``target``:
-    of the bound that is shown first.
+    error beyond which a reading is refused, infinite where the plan is to derive it.
     """
 
     joint_rad: FiniteFloat = float(np.deg2rad(0.02))
     implausible_mm: FiniteFloat = math.inf
     tolerance_mm: float | None = None
-    target: Literal["measured", "candidates", "region"] = "candidates"
 
 
 # Found in 98 % of campaigns with a drift of three standard deviations, for a tenth of the width.
@@ -161,11 +163,7 @@ def _recorded(value: Any) -> AdaptiveAssessor:
     """The assessor of a file, or one that is there already."""
     if not isinstance(value, Mapping):
         return value
-    settings = value["settings"]
-    used = [key for key, former in _FORMER.items() if settings.get(key, former) != former]
-    fix = "begin a new campaign; readings can be recorded in it again"
-    refuse(Problem(f"setting {key}", "is gone from kinacc", fix=fix) for key in used)
-    return assessor_of(value["name"], {key: settings[key] for key in settings.keys() - _FORMER})
+    return assessor_of(value["name"], dict(value["settings"].items() - _FORMER.items()))
 
 
 def _pose(value: Any) -> Pose:

@@ -23,13 +23,12 @@ from kinacc.study.fields import ErrorField
 class Aim:
     """Aim of a campaign: bounds at most ``width_mm`` apart, or a decision on ``tolerance_mm``.
 
-    ``power``: share of campaigns that have to reach it. ``target`` of the bounds.
+    ``power``: share of campaigns that have to reach it.
     """
 
     width_mm: float | None = None
     tolerance_mm: float | None = None
     power: float = 0.8
-    target: str = CANDIDATES
 
     @property
     def is_set(self) -> bool:
@@ -58,7 +57,6 @@ class BudgetPlan:
     assessor: str
     candidates: int
     noise_mm: tuple[float, ...]
-    target: str
     width_mm: float | None
     tolerance_mm: float | None
     power: float
@@ -101,18 +99,19 @@ def plan_budget(
     Raises
     ------
     InputError
-        Where a field has too few errors, or an assessor states no bound on the target.
+        Where a field has too few errors, or an assessor states nothing about candidates.
     """
     runs = simulate(fields, candidates, covariance_mm2, assessors, repetitions, seed, aim)
     rows = counted(runs, aim)
     return BudgetPlan(
-        assessors[0].name,
-        candidates,
-        tuple(np.sqrt(np.diag(covariance_mm2)).tolist()),
-        aim.target,
-        *(aim.width_mm, aim.tolerance_mm, aim.power, repetitions, seed),
-        smallest_budget(rows["budget"], rows["reached_low"], aim),
-        rows,
+        assessor=assessors[0].name,
+        candidates=candidates,
+        noise_mm=tuple(np.sqrt(np.diag(covariance_mm2)).tolist()),
+        **vars(aim),
+        repetitions=repetitions,
+        seed=seed,
+        budget=smallest_budget(rows["budget"], rows["reached_low"], aim),
+        rows=rows,
     )
 
 
@@ -150,10 +149,9 @@ def simulate(
         for assessor in assessors:
             campaign = assessor.begin(candidates)
             readings, visited = carry_on(campaign, reading), campaign.ledger.visited
-            stated = [item for item in campaign.statements() if item.target == aim.target]
+            stated = [item for item in campaign.statements() if item.target == CANDIDATES]
             if not stated:
-                message = f"{assessor.name} states nothing about {aim.target}"
-                raise input_error("--assessor", message, fix="choose another, or --target")
+                raise input_error("--assessor", f"{assessor.name} states nothing about candidates")
             statement, arm_mm = stated[0], getattr(assessor, "arm_mm", None)
             limits = limits_of(statement, visited, size_mm, sigma_mm, assessor.measurements)
             arm_mm = sigma_mm if arm_mm is None else arm_mm

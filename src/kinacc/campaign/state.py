@@ -133,9 +133,8 @@ def faults_of(plan: Plan, reading: Reading, where: str) -> list[Problem]:
         if values is None:
             continue
         if values.shape != (count,) or not (np.abs(values) <= _FARTHEST_MM).all():
-            text = ", ".join(f"{value:g}" for value in values.ravel())
             allowed = f"{count} numbers within {_FARTHEST_MM:g}"
-            problems.append(Problem(where, f"{name} ({text})", allowed))
+            problems.append(Problem(where, f"{name} {values.tolist()}", allowed))
     if reading.std is not None:
         with gathered(problems):
             covariance_of(reading.std, f"{where}, standard deviation")

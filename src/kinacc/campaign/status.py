@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import shlex
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -22,7 +22,7 @@ from kinacc.assess.statement import (
     decide,
 )
 from kinacc.campaign.folder import Opened
-from kinacc.campaign.plan import Plan
+from kinacc.campaign.plan import TARGETS, Plan
 from kinacc.campaign.state import Scatter, State, scatter, size_scatter
 
 _CLEAR_OF_NOISE = 3.0  # standard deviations: larger bounds hold where the noise is smaller
@@ -84,8 +84,8 @@ class CampaignStatus:
     ``readings`` were taken, ``readings_used`` of them requested by the assessor so far; ``scatter``
     compares repeated readings with the stated noise. ``against``: reasons why the bounds are
     withheld or unreliable, with ``advice``; ``assumes``: conditions of the bounds; ``notes``:
-    findings on noise, frame, left-out points and struck readings; ``overruled``: doubts at the
-    start that were overruled. ``bounds``: the main target first.
+    findings on noise and frame; ``left_out``, ``struck``: points and readings with the reason;
+    ``overruled``: doubts at the start that were overruled. ``bounds``: the main target first.
     """
 
     folder: str
@@ -120,8 +120,7 @@ class CampaignStatus:
     @property
     def of_all(self) -> Bound:
         """The bound on all candidates, else on a share of the region, else on measured points."""
-        order = (CANDIDATES, REGION, MEASURED)
-        return min(self.bounds, key=lambda bound: order.index(bound.target))
+        return min(self.bounds, key=lambda bound: TARGETS.index(bound.target))
 
     @property
     def next_command(self) -> str:
@@ -151,7 +150,7 @@ def status(opened: Opened, tolerance_mm: float | None = None) -> CampaignStatus:
     candidates = len(state.rows)
     near, repeats = size_scatter(state), scatter(state)
     bounds = [_bound(item, state, tolerance_mm) for item in stated]
-    bounds.sort(key=lambda item: (math.isnan(item.upper_mm), item.target != plan.limits.target))
+    bounds.sort(key=lambda item: (math.isnan(item.upper_mm), TARGETS.index(item.target)))
     if visited == candidates and len({(b.lower_mm, b.value_mm, b.upper_mm) for b in bounds}) == 1:
         bounds = [item for item in bounds if item.target != MEASURED] or bounds
     reasons = [item.withheld for item in stated if item.withheld]
@@ -178,6 +177,14 @@ def status(opened: Opened, tolerance_mm: float | None = None) -> CampaignStatus:
     if not alarms:
         against += [item.doubt for item in bounds if item.doubt]
     notes += [item.noise for item in bounds if item.noise]
+    change = state.campaign.change()
+    if change is not None and change.is_found:
+        notes.append(reason(change.reason))
+    elif change is not None:
+        notes.append(
+            "the reference poses show no drift and no step (a drift of "
+            f"{change.unseen_mm:.3f} mm would be found in half of the cases)"
+        )
     return CampaignStatus(
         folder=str(opened.folder),
         **{name: plan.about[name] for name in ("robot", "calibration", "model", "point")},
@@ -196,7 +203,7 @@ def status(opened: Opened, tolerance_mm: float | None = None) -> CampaignStatus:
         against=tuple(dict.fromkeys(against)),
         advice=tuple(ADVICE[code] for code in alarms),
         assumes=_assumes(plan, bounds[0]),
-        notes=tuple(dict.fromkeys([*notes, *_findings(state)])),
+        notes=tuple(dict.fromkeys(notes)),
         overruled=plan.overruled,
         bounds=tuple(bounds),
     )
@@ -270,23 +277,6 @@ def _assumes(plan: Plan, bound: Bound) -> str:
         "and a fixed base, tool and instrument",
     ]
     return f"Assumes independent normal readings with {', '.join(filter(None, parts))}."
-
-
-def _findings(state: State) -> Iterable[str]:
-    """What the reference poses show; points left out and readings struck."""
-    change, label = state.campaign.change(), state.plan.points.label
-    if change is not None and change.is_found:
-        yield reason(change.reason)
-    elif change is not None:
-        yield (
-            "the reference poses show no drift and no step (a drift of "
-            f"{change.unseen_mm:.3f} mm would be found in half of the cases)"
-        )
-    for point, why in state.left_out.items():
-        yield f"point {label[point]} was left out: {why}"
-    for item in state.struck:
-        place = f"{np.linalg.norm(item.error_mm):.3f} mm at {label[item.reading.point]}"
-        yield f"reading {item.number} ({place}) was struck: {item.struck}"
 
 
 # Texts of the codes of assessors.

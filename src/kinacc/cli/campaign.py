@@ -63,14 +63,10 @@ def next_(folder: str, every: bool, out: Output) -> None:
       kinacc campaign next check --all -o visit.csv
     """
     opened = _open(folder)
-    table, pose, summary = opened.visit(every), opened.next_pose(), opened.status()
-    shown = table[[name for name in table if not name.endswith("_rad")]]
-    lines = progress = texts("campaign_pose.txt", s=summary, pose=None)
-    if pose is not None and not every and out.table is None:
-        joints = {"degrees": np.rad2deg(pose.joints), "slides": opened.plan.slides}
-        lines = texts("campaign_pose.txt", s=summary, pose=pose, **joints)
-        shown = shown.head(0)
-    out.show({"rows": table, "progress": progress[0]}, table, lines, shown)
+    table, pose = opened.visit(every), None if every else opened.next_pose()
+    about = {"s": opened.status(), "pose": pose, "slides": opened.plan.slides}
+    lines = texts("campaign_pose.txt", degrees=np.rad2deg, **about)
+    out.show({"rows": table}, table, lines, table if every else table.head(0))
 
 
 @campaign.command("leave-out")
@@ -144,20 +140,20 @@ def report(folder: str, to: str | None, out: Output) -> None:
         raise input_error(folder, "no reading was requested and taken yet")
     tables, metadata = reports.tables(opened), folders.marks_of(opened)
     part = section(opened, tables)
-    contents = {
-        f"{name}.parquet": content_of(to_table(name, table, metadata))
+    contents: dict[Path | str, bytes] = {
+        into / f"{name}.parquet": content_of(to_table(name, table, metadata))
         for name, table in tables.items()
     }
-    pictures = render(part.figures["bounds"], ("svg", "png"))
-    contents |= {f"campaign.{kind}": content for kind, content in pictures.items()}
-    contents["report.md"] = markdown(part, "campaign.svg").encode()
-    require_writable([into / name for name in contents], out.force or to is None)
-    write_together({into / name: content for name, content in contents.items()})
+    for kind, content in render(part.figures["bounds"], ("svg", "png")).items():
+        contents[into / f"campaign.{kind}"] = content
+    contents[into / "report.md"] = markdown(part, "campaign.svg").encode()
+    require_writable(contents, out.force or to is None)
+    write_together(contents)
     if out.page is not None:
         out.write_page(campaign_page(opened, part), metadata)
-    result = campaign.status()
-    lines = [_lines(result)[0], f"{into}: {', '.join(contents)}", out.page or ""]
-    answer = {**vars(result), "report": str(into), "files": [*contents], "page": out.page}
+    result, files = campaign.status(), [Path(path).name for path in contents]
+    lines = [_lines(result)[0], f"{into}: {', '.join(files)}", out.page or ""]
+    answer = {**vars(result), "report": str(into), "files": files, "page": out.page}
     out.show(answer, lines=filter(None, lines))
 
 
@@ -232,19 +228,17 @@ def record(out: Output, folder: str, file: str | None, **options: Any) -> None:
         raise input_error("the reading", message, "--position-mm, or a FILE")
     campaign = Campaign(folder)
     flags = {name: options[name] for name in ("instrument", "accept_implausible", "again")}
-    plan, number = campaign.plan, campaign.state.requested
-    requested = None if number is None else plan.points.label[number]
     if file is not None:
         if (point, joints) != (None, None):
             raise input_error("--point, --joints-deg", "are columns of a file")
         taken = campaign.add_readings(file, **flags)
     else:
         if joints is not None:
-            joints = joints_given("--joints-deg", joints, plan.slides)
+            joints = joints_given("--joints-deg", joints, campaign.plan.slides)
         position_mm = numbers_given("--position-mm", position, 3)
         taken = campaign.add_reading(position_mm, point, joints, **flags)
     summary = campaign.status()
-    first = texts("recorded.txt", taken=taken, file=file, requested=requested)
+    first = texts("recorded.txt", taken=taken, file=file)
     out.show({**vars(taken), "status": summary}, lines=[*first, *_lines(summary)])
 
 

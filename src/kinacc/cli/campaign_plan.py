@@ -36,10 +36,7 @@ _SHOWN = {
     "width_median_mm": "Width, mm\nmedian",
     "width_q95_mm": "Width, mm\n95 % below",
     "holding": "Upper bounds\nthat hold",
-    "within": "Share with\nwidth wanted",
-    "accept": "Share\naccepted",
-    "reject": "Share\nrejected",
-    "undecided": "Share\nundecided",
+    "reached": "Campaigns that\nreach the aim",
 }
 
 
@@ -68,7 +65,7 @@ def plan(out: Output, **options: Any) -> None:
     Example:
       kinacc campaign plan --noise-mm 0.05 --candidates 200 --width-mm 0.3 --errors results/arm
     """
-    aim = Aim(options["width_mm"], options["tolerance_mm"], options["power"], options["target"])
+    aim = Aim(options["width_mm"], options["tolerance_mm"], options["power"])
     errors, covariance, assessors = _question(options)
     points, repetitions, seed = (options[name] for name in ("candidates", "repetitions", "seed"))
     with reporting("campaign plan"):
@@ -81,8 +78,7 @@ def plan(out: Output, **options: Any) -> None:
         out.draw(draw_budgets(rows, aim.width_mm, power, budgets.budget))
     table = budgets.rows.replace(math.inf, math.nan)
     absent = [] if table["excepted"].any() else ["excepted"]
-    absent += ["within"] if aim.width_mm is None else []
-    absent += ["accept", "reject", "undecided"] if aim.tolerance_mm is None else []
+    absent += [] if aim.is_set else ["reached"]
     holding = [f"{row.holding} of {row.judged}" for row in table.itertuples()]
     shown = table.assign(holding=holding)[[*_SHOWN]].drop(columns=absent).rename(columns=_SHOWN)
     budget = budgets.budget or int(table["budget"].max())

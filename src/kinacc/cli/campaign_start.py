@@ -83,7 +83,7 @@ def start(out: Output, **options: Any) -> None:
         source = "drawn evenly from the joints the calibration covers"
     tolerance_mm = _tolerance_mm(options["tolerance_mm"], results)
     apart_rad = np.deg2rad(options["joint_tolerance_deg"])
-    limits = Limits(apart_rad, tolerance_mm=tolerance_mm, target=options["target"])
+    limits = Limits(apart_rad, tolerance_mm=tolerance_mm)
     assessor = assessor_of(options, options["budget"], len(points), freedom)
     plan = begin.plan_of(arm, points, assessor, used, limits, point, source, options["seed"])
     known = begin.noise_of(results)
@@ -139,9 +139,7 @@ def assessor_of(options: Options, budget: int, points: int, freedom: int) -> Ada
     }
     settings["measurements"] = budget
     if options["noise"] == "estimate" or freedom:
-        settings["noise"] = ESTIMATED
-    if freedom:
-        settings["noise_freedom"] = freedom
+        settings |= {"noise": ESTIMATED, "noise_freedom": freedom}
     for text in options["settings"]:
         key, equals, value = text.partition("=")
         if not equals:

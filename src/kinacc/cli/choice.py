@@ -68,8 +68,6 @@ def together(*options: Decorator) -> Decorator:
     return decorate
 
 
-# Which calibration: its folder, and the model.
-calibration_options = together(FOLDER, SELECTED)
 # Which point in which frame.
 point_options = together(
     option(
@@ -176,12 +174,6 @@ campaign_options = together(
     option("--set", "settings", multiple=True, help="Setting of the assessor: NAME=VALUE."),
     option("--confidence", type=float, help=f"How surely each bound is to hold. [{CONFIDENCE}]"),
     option("--tolerance-mm", type=positive, help="Largest error the arm is allowed to have."),
-    option(
-        "--target",
-        type=click.Choice(["candidates", "measured"]),
-        default="candidates",
-        help="Which largest error the aims are about.",
-    ),
     option("--seed", default=0, type=click.IntRange(0), help="Decides every random draw."),
     option("--sure", is_flag=True, help="Take values that look like slips as they are."),
 )

@@ -15,11 +15,11 @@ from kinacc.cli.choice import option
 from kinacc.cli.output import Output, answers
 from kinacc.config import schema
 from kinacc.deployment import compare as comparison
+from kinacc.deployment.planning import spread
 from kinacc.deployment.record import Calibration, nominal
 from kinacc.deployment.shared_readings import shared
 from kinacc.errors import input_error
 from kinacc.kinematics import robot as robots
-from kinacc.kinematics.region import points
 from kinacc.kinematics.robot import Robot
 from kinacc.progress import reporting
 from kinacc.report.rendering import lines
@@ -87,8 +87,6 @@ def _joints(arms: Sequence[Robot], measured: Sequence[Columns | None]) -> np.nda
     joints = arms[0].dh.joints
     tables = [reported_joints(table, joints) for table in measured if table]
     if tables:
-        share = _POSES // len(tables)
-        return np.concatenate([q[np.sort(spread_rows(len(q), share))] for q in tables])
-    low = np.max([arm.q_min_rad for arm in arms], axis=0)
-    high = np.min([arm.q_max_rad for arm in arms], axis=0)
-    return low + points("sobol", _POSES, len(low)) * (high - low)
+        measured_rad = np.concatenate(tables)
+        return measured_rad[np.sort(spread_rows(len(measured_rad), _POSES))]
+    return spread(arms[0], _POSES, (arms[1].q_min_rad, arms[1].q_max_rad))

@@ -100,16 +100,15 @@ def _accept(files: Sequence[str], dataset: Sequence[str], kind: str, reason: str
     problems = [] if reason.strip() else [_EMPTY_REASON]
     problems += [] if len(files) == 1 else [Problem("--accept", "needs one FILE.yaml")]
     refuse(problems)
-    name, _ = _measured_data_set(files[0], next(iter(dataset), None))
+    name, _ = measured_data_set(files[0], next(iter(dataset), None))
     add_to(files[0], ("datasets", name, "data_check", "accept"), {kind: reason})
 
 
 def _sections(files: Sequence[str], wanted: Sequence[str]) -> dict[str, dict[str, Any]]:
     """The data sets to check: the wanted ones, or all that are read from a file."""
-    full = load(files)
-    measured = [name for name, c in full.items() if c["measurements"]["source"] == "file"]
+    measured = _measured(files)
     # The newest line of a series is the arm's own file.
-    chosen = wanted or [name for name in measured if "series" not in full[name]]
+    chosen = wanted or [name for name in measured if "series" not in measured[name]]
     refuse(
         Problem("--dataset", f"{name!r} is not read from a file", ", ".join(measured))
         for name in chosen
@@ -117,7 +116,16 @@ def _sections(files: Sequence[str], wanted: Sequence[str]) -> dict[str, dict[str
     )
     if not chosen:
         raise input_error(", ".join(files), "no data set is read from a file")
-    return {name: full[name] for name in chosen}
+    return {name: measured[name] for name in chosen}
+
+
+def _measured(files: Sequence[str]) -> dict[str, dict[str, Any]]:
+    """Settings of the data sets that are read from a file."""
+    return {
+        name: settings
+        for name, settings in load(files).items()
+        if settings["measurements"]["source"] == "file"
+    }
 
 
 @click.command("exclude")
@@ -133,7 +141,7 @@ def exclude(file: str, lines: str, reason: str | None, dataset: str | None, out:
     Example:
       kinacc exclude tracker.yaml --lines 12,15-18 --reason "reflector moved"
     """
-    name, settings = _measured_data_set(file, dataset)
+    name, settings = measured_data_set(file, dataset)
     section = settings["measurements"]["file"]
     numbers = _numbers(lines)
     known = [number for number in numbers if number in excluded_lines(section)]
@@ -148,13 +156,12 @@ def exclude(file: str, lines: str, reason: str | None, dataset: str | None, out:
     out.show({"file": file, "dataset": name, **item}, lines=text)
 
 
-def _measured_data_set(file: str, dataset: str | None) -> tuple[str, dict[str, Any]]:
+def measured_data_set(file: str, dataset: str | None) -> tuple[str, dict[str, Any]]:
     """Name and settings of a measured data set; InputError where it is not clear which."""
     measured = {
         name: settings
-        for name, settings in load([file]).items()
-        if settings["measurements"]["source"] == "file"
-        and {"line_of", "series"}.isdisjoint(settings)
+        for name, settings in _measured([file]).items()
+        if {"line_of", "series"}.isdisjoint(settings)
     }
     name = dataset or (next(iter(measured)) if len(measured) == 1 else "")
     if name not in measured:

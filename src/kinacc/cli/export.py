@@ -71,7 +71,7 @@ def export(
         return
     content = source.read_source(folder, model, urdf, (base_link, tip_link))
     paths = files.write(files.contents(content, wanted), target, out.force)
-    out.show({"files": paths, **({"outdated": reason} if reason else {})}, lines=paths)
+    out.show({"files": paths, "outdated": reason}, lines=paths)
     for item in source.notes(content):
         click.echo(item, err=True)
 

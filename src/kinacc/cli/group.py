@@ -19,7 +19,6 @@ from kinacc.errors import InputError, KinaccError, MachineError, Problem, refuse
 from kinacc.workflow.start import ONE_THREAD
 
 _AS_JSON = f"{__name__}.as_json"
-_HELP = ("-h", "--help")
 # The commands by purpose, each with the module of its code and what it does.
 SECTIONS = {
     "Measured data": {
@@ -80,8 +79,7 @@ class Commands(InOrder):
     def parse_args(self, context: click.Context, args: list[str]) -> list[str]:
         """Note whether problems are asked for as JSON; more threads of BLAS are not."""
         context.meta[_AS_JSON] = "--json" in args
-        if {*args}.isdisjoint(_HELP):
-            os.environ.update(ONE_THREAD)
+        os.environ.update(ONE_THREAD)
         return super().parse_args(context, args)
 
     def invoke(self, context: click.Context) -> object:
@@ -152,7 +150,7 @@ def _listening(signals: list[int]) -> Iterator[None]:
 @click.group(
     cls=Commands,
     commands={name: click.Command(name) for name in _MODULES},  # their names, before any is loaded
-    context_settings={"help_option_names": list(_HELP)},
+    context_settings={"help_option_names": ["-h", "--help"]},
 )
 @click.version_option(__version__, prog_name="kinacc")
 def main() -> None:

@@ -15,7 +15,7 @@ from scipy.spatial.transform import Rotation
 from kinacc.calibration.summary import reported_joints
 from kinacc.checks.described import corrected, coupling_of, fitting, remarks_on
 from kinacc.checks.findings import Report
-from kinacc.cli import choice, rows
+from kinacc.cli import choice
 from kinacc.cli.choice import option
 from kinacc.cli.output import Output, answers
 from kinacc.config.names import LONGEST
@@ -25,6 +25,7 @@ from kinacc.measurements.intake import write
 from kinacc.measurements.intake.groups import listed
 from kinacc.measurements.intake.guess import Guess, look
 from kinacc.measurements.reader import MeasuredFile, read
+from kinacc.measurements.rows import joint_columns
 from kinacc.progress import reporting
 from kinacc.report import rendering
 from kinacc.report.terminal import print_table
@@ -61,7 +62,7 @@ class Description:
         Limits of the readings that contradict nothing.
     first_poses
         A row for each target of the first poses, as understood: joints (deg, mm), position (mm),
-        rotation vector (deg), and number of readings.
+        rotation vector (deg).
     next
         The commands that follow.
     """
@@ -124,10 +125,10 @@ def init(measurement_files: tuple[str, ...], out: Output, **options: Any) -> Non
         raise input_error(
             str(dataset), "is the robot file, and would be overwritten", fix="give --name"
         )
-    require_writable([dataset], out.force)
     robot, chosen = _robot(guess, options["robot"])
     text = _robot_text(robot, guess.joints, name, robot_file.parent)
     texts = {} if text is None else {robot_file: text}
+    require_writable([dataset, *texts], out.force)
     report, remarks = None, []
     if robot is None:  # joints need no robot to be read
         arm = robots.of_text(write.template_text("any", guess.joints), "any.yaml")
@@ -160,7 +161,6 @@ def init(measurement_files: tuple[str, ...], out: Output, **options: Any) -> Non
     head += [f"Not read: {names} ({why})." for why, names in unread.items() if why]
     used = robot if robot and text is None else str(robot_file)
     texts[dataset] = _dataset(dataset, name, used, guess, report, head)
-    require_writable(texts, out.force)
     write_together({path: content.encode() for path, content in texts.items()})
     result = Description(
         written=[str(path) for path in texts],
@@ -185,16 +185,16 @@ def _first_poses(reading: MeasuredFile, prismatic: np.ndarray) -> pd.DataFrame:
     """A row for each target of the first poses, as it was read first, in deg and mm."""
     table = pd.DataFrame(reading.columns)
     table = table[table["pose"].isin(table["pose"].unique()[:_FIRST_POSES])]
-    counts = table.groupby(["pose", "target"], sort=False).size()
     table = table.drop_duplicates(["pose", "target"]).reset_index(drop=True)
     joints = reported_joints(table, len(prismatic))
     where = [reading.row_names.one(int(line)) for line in table["row"]]
-    first = pd.DataFrame({"where": where, **rows.joint_columns(prismatic, joints)})
+    first = pd.DataFrame({"where": where, **joint_columns(prismatic, joints)})
     first = first.join(table[["target", "x_mm", "y_mm", "z_mm"]])
     turned = table[_QUATERNION].astype(float).dropna()
-    vector = Rotation.from_quat(turned).as_rotvec(degrees=True) if len(turned) else None
-    vectors = pd.DataFrame(vector, turned.index, ["rvx_deg", "rvy_deg", "rvz_deg"], dtype=float)
-    return first.join(vectors).assign(readings=counts.to_numpy())
+    if len(turned):
+        vectors = Rotation.from_quat(turned).as_rotvec(degrees=True)
+        first.loc[turned.index, ["rvx_deg", "rvy_deg", "rvz_deg"]] = vectors
+    return first
 
 
 def _robot(guess: Guess, stated: str | None) -> tuple[str | None, str]:

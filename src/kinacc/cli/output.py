@@ -69,11 +69,11 @@ class Output:
             return
         for line in lines:
             click.echo(as_seen(line))
-        table = table if shown is None else shown
+        shown = table if shown is None else shown
         if self.table is not None:
             click.echo(f"{self.table}: {len(table)} rows")
-        elif len(table):
-            print_table(table, most)
+        elif len(shown):
+            print_table(shown, most)
 
     def draw(self, figure: Figure) -> None:
         """Write the picture."""

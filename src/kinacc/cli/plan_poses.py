@@ -17,6 +17,7 @@ from kinacc.config import schema
 from kinacc.deployment import planning
 from kinacc.geometry import Pose, compose
 from kinacc.kinematics import robot as robots
+from kinacc.measurements.rows import joint_columns
 from kinacc.progress import reporting
 from kinacc.report.rendering import lines
 
@@ -66,7 +67,7 @@ def plan_poses(robot: str, count: int, out: Output, **options: Any) -> None:
         out.draw(draw_observability(plan.index, arm.name))
     table = pd.DataFrame({
         "order": np.arange(1, count + 1),
-        **rows.joint_columns(arm.dh.prismatic, joints[plan.chosen]),
+        **joint_columns(arm.dh.prismatic, joints[plan.chosen]),
         "move_deg": np.rad2deg(plan.moves_rad),
         "candidate": candidates.label[plan.chosen],
     })  # fmt: skip

@@ -17,7 +17,6 @@ from kinacc.cli.output import Output, answers
 from kinacc.cli.process import AGAINST
 from kinacc.deployment import predict as prediction
 from kinacc.deployment import programs
-from kinacc.deployment.applicability import deviations, is_measured_there
 from kinacc.deployment.compensate import (
     ROTATION_TOLERANCE_RAD,
     Compensation,
@@ -27,8 +26,7 @@ from kinacc.deployment.compensate import compensate as joints_for
 from kinacc.deployment.record import Calibration
 from kinacc.errors import first_few, input_error
 from kinacc.geometry import Pose, rotation_from_quaternion
-from kinacc.kinematics.model import JointState
-from kinacc.measurements.rows import Rows
+from kinacc.measurements.rows import Rows, joint_columns
 from kinacc.measurements.table import numbers_of
 from kinacc.progress import reporting
 from kinacc.report.rendering import lines
@@ -47,7 +45,8 @@ _STATUS = {
 
 
 @click.command("predict")
-@choice.calibration_options
+@choice.FOLDER
+@choice.SELECTED
 @click.argument("joints", type=choice.PATH, required=False)
 @option("--joints-deg", multiple=True, help='One configuration, e.g. "0,-20,30,0,45,0".')
 @choice.joint_file_options
@@ -83,7 +82,7 @@ def predict(
     inputs, q = rows.joints_of(arm, joints, joints_deg, choice.joint_answers(file))
     with reporting("predict"):
         result = prediction.predict(calibration, q, inputs.directions, frame, point, inputs.payload)
-    named = pd.DataFrame({"row": inputs.label, **rows.joint_columns(arm.dh.prismatic, q)})
+    named = pd.DataFrame({"row": inputs.label, **joint_columns(arm.dh.prismatic, q)})
     table = named.join(result.table())
     facts = calibration.facts(frame, point)
     shown = table if out.verbose else table[["row", *_SHOWN]]
@@ -94,7 +93,8 @@ def predict(
 
 
 @click.command("compensate")
-@choice.calibration_options
+@choice.FOLDER
+@choice.SELECTED
 @click.argument("poses", type=choice.PATH, required=False)
 @option("--pose", "texts", multiple=True, help='A pose in mm: "x,y,z,qw,qx,qy,qz".')
 @option("--near-deg", help="Joints near the posture, where none is stated.")
@@ -154,17 +154,14 @@ def compensate(
         result = joints_for(
             calibration, wanted, inputs.joints, inputs.directions, frame, point, inputs.payload
         )
-        q_dh = calibration.robot.dh_joints(result.q_rad)
-        there = np.isfinite(q_dh).all(axis=1)
-        state = JointState(q_dh[there])
-        unlike = ~calibration.outside_range(q_dh).any(axis=1) & there
-        unlike[there] &= ~is_measured_there(calibration, state, point)
+        unlike = np.isfinite(result.q_rad).all(axis=1)
+        there = prediction.predict(calibration, result.q_rad[unlike], None, frame, point)
+        unlike[unlike] = ~there.near & ~there.outside.any(axis=1)
     table = _table_of(calibration, inputs.label, wanted, result, unlike)
     facts = calibration.facts(frame, point)
     shown = table.drop(columns=[*prediction.pose_columns(wanted)])
     out.show(facts | {"rows": table}, table, ["Joints of " + _TITLE.format(**facts)], shown)
-    moved_mm = deviations(calibration, state, frame, point)[1][:, 0]
-    rows.print_remarks(inputs, calibration, unlike, moved_mm, frame)
+    rows.print_remarks(inputs, calibration, unlike, there.undetermined[:, 0], frame)
     rows.end_where_missing(result.q_rad, "joints")
 
 
@@ -223,7 +220,7 @@ def _table_of(
     change_deg = np.where(prismatic, -1.0, np.rad2deg(np.abs(answer.change)))
     table = {
         "row": label,
-        **rows.joint_columns(prismatic, answer.q_rad),
+        **joint_columns(prismatic, answer.q_rad),
         "status": texts,
         "solver_residual_mm": answer.position_error_mm,
         "orientation_error_mrad": rotation_mrad,

@@ -100,9 +100,7 @@ def report(folder: str, path: str | None, out: Output) -> None:
       kinacc report results/ur10_b --out ur10_b.html
     """
     page = written(folder, path)
-    size = page.stat().st_size
-    line = f"{page}: {size / 1e6:.1f} MB, one file that needs no network"
-    out.show({"page": str(page), "bytes": size}, lines=[line])
+    out.show({"page": str(page)}, lines=[f"{page}: one file that needs no network"])
 
 
 def written(folder: str, out: str | None = None) -> Path:

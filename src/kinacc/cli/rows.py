@@ -67,14 +67,6 @@ def joints_of(
     return rows, joints
 
 
-def joint_columns(prismatic: np.ndarray, joints: np.ndarray) -> dict[str, np.ndarray]:
-    """Columns of reported joints (n, k): q1_deg .., q1_mm where a joint slides (k,)."""
-    return {
-        f"q{joint + 1}_{'mm' if slides else 'deg'}": values if slides else np.rad2deg(values)
-        for joint, (slides, values) in enumerate(zip(prismatic, joints.T, strict=True))
-    }
-
-
 def candidates(
     options: Options, robot: Robot, most: int, draw: Callable[[int], np.ndarray]
 ) -> tuple[Rows, np.ndarray]:

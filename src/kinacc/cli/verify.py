@@ -7,15 +7,15 @@ from pathlib import Path
 
 import click
 
-from kinacc.checks.configuration import load
 from kinacc.cli.choice import PATH, option
+from kinacc.cli.data import measured_data_set
 from kinacc.cli.output import Output, answers
 from kinacc.cli.process import AGAINST, DONE, UNDECIDED
 from kinacc.config.records import Settings
 from kinacc.deployment import folder as results
 from kinacc.deployment import verify as verification
 from kinacc.deployment.permutation import LEVEL
-from kinacc.errors import InputError, Problem, input_error
+from kinacc.errors import InputError, Problem
 from kinacc.kinematics import robot as robots
 from kinacc.progress import reporting
 from kinacc.report import rendering
@@ -66,14 +66,16 @@ def verify(
         result = verification.verify(tables, columns, moved, weight)
     for text in dict.fromkeys(str(warning.message) for warning in caught):
         click.echo(f"{name}: {text}", err=True)
-    asked = {"new": str(readings), "folder": folder, "dataset": dataset, "moved": moved}
     lines = rendering.lines(
         "verify.txt",
         v=result,
         level=LEVEL,
         slides=arm.dh.prismatic,
         set_up_moved=verification.SET_UP_MOVED,
-        **asked,
+        new=str(readings),
+        folder=folder,
+        dataset=dataset,
+        moved=moved,
     )
     shown = result.errors if out.verbose else result.errors.drop(columns=[*_DETAILS])
     out.show(result, result.errors, lines, shown)
@@ -85,9 +87,4 @@ def _settings(readings: Path, folder: str, dataset: str | None) -> tuple[str, Se
     """Name and settings of the new readings: those of a .yaml, or of the calibration."""
     if readings.suffix.lower() not in _YAML:
         return readings.stem, like_those_of(Path(folder), readings)
-    settings = load([str(readings)])
-    name = next(iter(settings)) if dataset is None and len(settings) == 1 else dataset
-    if name not in settings:
-        message = f"{dataset!r} is none of its data sets" if dataset else "is not given"
-        raise input_error("--dataset", message, ", ".join(settings))
-    return name, settings[name]
+    return measured_data_set(str(readings), dataset)

@@ -155,6 +155,14 @@ def _label(table: RawTable, columns: FileColumns) -> str | None:
     return None
 
 
+def joint_columns(prismatic: np.ndarray, joints: np.ndarray) -> dict[str, np.ndarray]:
+    """Columns of reported joints (n, k): q1_deg .., q1_mm where a joint slides (k,)."""
+    return {
+        f"q{joint + 1}_{'mm' if slides else 'deg'}": values if slides else np.rad2deg(values)
+        for joint, (slides, values) in enumerate(zip(prismatic, joints.T, strict=True))
+    }
+
+
 def open_table(
     path: str | Path, need: str = POINTS, answers: Answers | None = None
 ) -> tuple[RawTable, Layout, tuple[str, ...]]:
