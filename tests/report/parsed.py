@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import lxml.html
 
-from kinacc.report.page import FirstScreen, Page, html
+from kinacc.report.page import Page, html
 
 
 class Shown(NamedTuple):
@@ -28,7 +28,7 @@ class Read(NamedTuple):
 
 def as_page(*sections) -> str:
     """Sections as a page whose first screen is empty."""
-    return html(Page(FirstScreen("made up", "", ("", False)), sections), {})
+    return html(Page("made up", "", ("", False), [], "", [], [], {}, sections), {})
 
 
 def read(section) -> Read:

@@ -7,6 +7,7 @@ rule figures:
         unpack(lambda w: robot(w.dataset)),
         dh_model="results/{dataset}/dh_model.parquet",
         frames="results/{dataset}/frames.parquet",
+        measurements="results/{dataset}/measurements.parquet",
         assessment_points="results/{dataset}/assessment_points.parquet",
         study_summary="results/{dataset}/study_summary.parquet",
         histories="results/{dataset}/histories.parquet",

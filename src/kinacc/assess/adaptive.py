@@ -96,8 +96,8 @@ class Ledger:
         self.candidates = candidates
         self.count = np.zeros(points, dtype=np.int64)
         self.visited: list[int] = []  # in the order of their first readings
-        # Every reading in order: its row, its numbers, its covariance where not the planned one.
-        self.readings: list[tuple[int, list[float], np.ndarray | None]] = []
+        # Every reading in order: its row, the reading (3,) and its covariance (3, 3).
+        self.readings: list[tuple[int, np.ndarray, np.ndarray]] = []
         self.unplanned: set[int] = set()  # rows with readings of other covariance
         self.mean_mm = np.zeros((points, 3))
         self.noise_mm = np.full(points, math.inf)  # of the mean, per axis, root mean square
@@ -114,23 +114,27 @@ class Ledger:
         self, point: int, reading_mm: ArrayLike, covariance_mm2: ArrayLike | None = None
     ) -> None:
         """Take one reading, or raise InputError and take nothing."""
-        points, reading, problems = self.candidates.points, np.asarray(reading_mm, dtype=float), []
-        covariance = None if covariance_mm2 is None else np.array(covariance_mm2, dtype=float)
+        points, reading, problems = self.candidates.points, np.array(reading_mm, dtype=float), []
         if not 0 <= point < points:
             problems.append(Problem("point", f"{point}", f"0 to {points - 1}"))
         if reading.shape != (3,) or not np.all(np.isfinite(reading)):
             problems.append(Problem("reading", f"{reading.tolist()}", "three numbers, in mm"))
-        if covariance is not None:
+        if covariance_mm2 is not None:
+            covariance = np.array(covariance_mm2, dtype=float)
             problems += _check_covariances(covariance[None], "covariance")
         refuse(problems, "this reading cannot be recorded")
         if not self.count[point]:
             self.visited.append(point)
         self.count[point] += 1
-        self.readings.append((point, reading.tolist(), covariance))
-        inverse = self.candidates.inverses[point]
-        if covariance is not None:
+        if covariance_mm2 is None:
+            covariance, inverse = (
+                self.candidates.covariance_mm2[point],
+                self.candidates.inverses[point],
+            )
+        else:
             self.unplanned.add(point)
             inverse = np.linalg.inv(covariance)
+        self.readings.append((point, reading, covariance))
         self._weight[point] += inverse
         self._weighted[point] += inverse @ reading
         spread = np.linalg.inv(self._weight[point])
@@ -146,9 +150,7 @@ class Ledger:
 
     def covariances(self, places: Iterable[int]) -> np.ndarray:
         """Covariances (n, 3, 3) of the readings at these places (0 = first)."""
-        read, planned = [self.readings[place] for place in places], self.candidates.covariance_mm2
-        spreads = [planned[row] if own is None else own for row, _, own in read]
-        return np.array(spreads).reshape(-1, 3, 3)
+        return np.array([self.readings[place][2] for place in places]).reshape(-1, 3, 3)
 
     def readings_of(self, point: int, number: int) -> tuple[np.ndarray, np.ndarray]:
         """The first readings of a point (number, 3) and their covariances (number, 3, 3)."""

@@ -21,7 +21,6 @@ from kinacc.compiled import compiled
 
 Arrays = tuple[np.ndarray, ...]  # of a world
 _ROOT_2_OVER_PI = math.sqrt(2.0 / math.pi)
-_SERIES_BELOW = 0.02
 _M0 = np.uint64(0xD2E7470EE14C6C93)
 _M1 = np.uint64(0xCA5A826395121157)
 _W0 = np.uint64(0x9E3779B97F4A7C15)
@@ -97,18 +96,9 @@ def extend_all(world: Arrays, wanted: int) -> None:
 
 
 @compiled
-def chi2_3(x: float) -> float:
-    """Chi-square distribution function, three degrees of freedom (eq. 18)."""
-    if x <= 0.0:
-        return 0.0
-    if x < _SERIES_BELOW:
-        # The closed form subtracts nearly equal numbers here.
-        total, term = 1.0, 1.0
-        for n in range(1, 7):
-            term *= x / (2 * n + 3)
-            total += term
-        return _ROOT_2_OVER_PI * x * math.sqrt(x) * math.exp(-0.5 * x) * total / 3.0
-    return math.erf(math.sqrt(0.5 * x)) - _ROOT_2_OVER_PI * math.sqrt(x) * math.exp(-0.5 * x)
+def chi2_3_above(x: float) -> float:
+    """Probability that a chi-square with three degrees of freedom exceeds x (1 - eq. 18)."""
+    return math.erfc(math.sqrt(0.5 * x)) + _ROOT_2_OVER_PI * math.sqrt(x) * math.exp(-0.5 * x)
 
 
 @compiled
@@ -138,7 +128,7 @@ def _follow(world: Arrays, near: float, far: float, alpha: float, squared: bool,
             bound = far if end else near
             score[end, row] = (sizes[row, v] - bound) * (roots[v + 1] / sigma[row])
             distance = max(score[end, row], 0.0)
-            miss[end, row] = 1.0 - chi2_3(distance * distance if squared else distance)
+            miss[end, row] = chi2_3_above(distance * distance if squared else distance)
         for end in range(ends):
             survival, place, largest = 1.0, -1, -np.inf
             for i in active[:count]:

@@ -452,12 +452,11 @@ class LowerAverage:
         for count, z in self._stages.items():
             if count > len(self._counted):
                 break
-            rows, along, noise = (
-                np.array(column) for column in zip(*self._counted[:count], strict=True)
-            )
+            rows, along, noise = np.array(self._counted[:count]).T
+            factors = factor[rows.astype(int)]
             if self._rate:
-                bounds.append(guarded_lower_mm(along, factor[rows] * noise, z, self._rate))
-                continue
-            off = z * math.sqrt(float(np.sum(factor[rows] ** 2)))
-            bounds.append((float(np.sum(along / noise)) - off) / float(np.sum(1.0 / noise)))
+                bounds.append(guarded_lower_mm(along, factors * noise, z, self._rate))
+            else:
+                off = z * math.sqrt(float(np.sum(factors**2)))
+                bounds.append((float(np.sum(along / noise)) - off) / float(np.sum(1.0 / noise)))
         return max(bounds)

@@ -80,21 +80,21 @@ def contrasts(ledger: Ledger, blocks: Sequence[int]) -> Contrasts:
 
     blocks: of each reading the number of its block; readings of a block are of one point.
     """
-    spreads = ledger.covariances(range(len(blocks)))
     under_way: dict[int, tuple[np.ndarray, np.ndarray]] = {}  # mean, and inverse of its covariance
-    places, values = [], []
-    for place, (block, spread) in enumerate(zip(blocks, spreads, strict=True)):
-        reading, added = np.array(ledger.readings[place][1]), np.linalg.inv(spread)
+    rows, places, values = [], [], []
+    read = zip(blocks, ledger.readings, strict=True)
+    for place, (block, (row, reading, spread)) in enumerate(read):
+        added = np.linalg.inv(spread)
         if block not in under_way:
             under_way[block] = reading, added
             continue
         mean, weight = under_way[block]
         apart = reading - mean
         values.append(np.linalg.solve(np.linalg.cholesky(spread + np.linalg.inv(weight)), apart))
+        rows.append(row)
         places.append(place)
         weight = weight + added
         under_way[block] = mean + np.linalg.solve(weight, added @ apart), weight
-    rows = [ledger.readings[place][0] for place in places]
     differences = np.array(values).reshape(-1, 3)
     return Contrasts(np.array(rows, np.int64), np.array(places, np.int64), differences)
 

@@ -7,10 +7,12 @@ from matplotlib.figure import Figure
 from mpl_toolkits.mplot3d import Axes3D
 
 from kinacc.calibration.summary import reported_joints
+from kinacc.config.error_models import PLAINEST
 from kinacc.config.records import Settings
 from kinacc.figures import style
-from kinacc.kinematics import dh, tables
+from kinacc.kinematics import dh
 from kinacc.kinematics import robot as robots
+from kinacc.study.evaluation import equipped
 from kinacc.tables.columns import Tables
 
 VIEW_DEG = (24.0, -58.0)  # elevation, azimuth
@@ -23,17 +25,14 @@ def run(inputs: Tables, settings: Settings) -> Figure:
 
     The tool centre point is the fitted one, or else the configured one.
     """
-    robot = robots.load(settings["robot"])
+    robot, evaluation = robots.load(settings["robot"]), settings["evaluation"]
     model = dh.DHModel.from_columns(inputs["dh_model"], robot.dh)
-    points, evaluation = inputs["assessment_points"], settings["evaluation"]
-    reported = reported_joints(points, model.joints)
-    carried = robots.carried(robot)
-    tool = tables.fitted_tool(inputs.get("frames"), "dh", carried)
-    offset_mm = carried.rotation @ np.asarray(evaluation["tool_mm"], float)
+    tool = equipped(inputs, evaluation, robot).by_name[PLAINEST].tool
+    reported = reported_joints(inputs["assessment_points"], model.joints)
     return draw(
         model,
         robot.dh_joints(reported),
-        tool_mm=carried.position_mm + offset_mm if tool is None else tool.position_mm,
+        tool_mm=tool.position_mm,
         cylinder=evaluation["cylinder"] if evaluation["space"] == "cylinder" else None,
         measured=evaluation["space"] == "measured",
         dataset=settings.get("dataset"),

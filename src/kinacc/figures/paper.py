@@ -13,7 +13,7 @@ from kinacc.config.records import Settings
 from kinacc.figures import fig1, fig2, fig3, style
 from kinacc.tables.columns import Columns, Tables
 
-FOOTNOTE = "* measured minus modelled: contains the instrument's noise"
+AT_MEASURED = "* measured minus modelled: contains the instrument's noise"
 OF_MODELS = "* taken as true by the study: VEC minus DH of a measured arm"
 
 
@@ -24,8 +24,7 @@ _UM_PER_MM = 1000.0
 def draw_figure(name: str, inputs: Tables, settings: Settings) -> Figure:
     """Draw ``fig1`` to ``fig6`` of the tables of a data set.
 
-    The true accuracy (eq. 7) is the largest true error of ``assessment_points``. Of a measured arm
-    it is only taken as true, as a footnote says.
+    The true accuracy (eq. 7) is the largest true error of ``assessment_points``.
     """
     dataset = settings.get("dataset")
     if name == "fig1":  # the same for every data set
@@ -34,13 +33,22 @@ def draw_figure(name: str, inputs: Tables, settings: Settings) -> Figure:
         return fig2.run(inputs, settings)
     if name == "fig3":
         return fig3.draw(inputs["accuracy_map"], dataset=dataset)
-    at_measured = settings["evaluation"]["space"] == "measured"
-    of_measured = settings["measurements"]["source"] != "synthetic"
-    taken_as_true = FOOTNOTE if at_measured else OF_MODELS if of_measured else None
-    truth = pd.Series(inputs["assessment_points"]["true_error_mm"]).max(), taken_as_true, dataset
+    truth = pd.Series(inputs["assessment_points"]["true_error_mm"]).max(), footnote(inputs), dataset
     if name == "fig4":
         return draw_noise(inputs["study_summary"], *truth)
     return draw_iterations(inputs["histories"], _EXAMPLES[name], *truth)
+
+
+def footnote(tables: Tables) -> str | None:
+    """What a study of a measured arm takes as true; None of the synthetic arm, which is known."""
+    points, measurements = (
+        pd.DataFrame(tables[name]) for name in ("assessment_points", "measurements")
+    )
+    joints = [name for name in points if name[:1] == "q" and name[1:].isdigit()]
+    measured = pd.MultiIndex.from_frame(measurements[joints])
+    if pd.MultiIndex.from_frame(points[joints]).isin(measured).all():
+        return AT_MEASURED
+    return OF_MODELS if measurements["row"].notna().any() else None
 
 
 def draw_noise(

@@ -17,7 +17,7 @@ from kinacc.campaign.plan import Plan
 from kinacc.campaign.status import Bound, CampaignStatus, percent, status
 from kinacc.config.error_models import model_name
 from kinacc.figures.campaign import draw_bounds, draw_readings
-from kinacc.report.page import FirstScreen, Page, Part, Table
+from kinacc.report.page import Page, Part
 from kinacc.report.rendering import environment, lines
 from kinacc.tables.columns import Tables
 
@@ -94,20 +94,22 @@ def campaign_page(opened: Opened, part: Part) -> Page:
         columns.append([f"tolerance {main.tolerance_mm:g} mm", "verdict"])
     withheld = {"sure": ""} if summary.against else {}
     rows = [_row(bound) | withheld for bound in summary.bounds]
-    first = FirstScreen(
+    return Page(
         f"Largest error of the {model_name(summary.model)} model of {summary.robot}",
         lines("campaign_progress.txt", s=summary)[0],
         _badge(summary),
         list(dict.fromkeys(answers)),
-        [Table("The largest error, mm", rows, columns)],
+        "The largest error, mm",
+        rows,
+        columns,
         {
             "CHECK": [*folder.doubts(opened), *summary.against[1:], *summary.overruled],
             "NOTES": summary.notes,
             "VALID": [f"for {_population(summary, opened.plan)}, not for other poses"],
             "NEXT": lines("campaign_next.txt", s=summary),
         },
+        [part],
     )
-    return Page(first, [part])
 
 
 def _badge(summary: CampaignStatus) -> tuple[str, bool]:

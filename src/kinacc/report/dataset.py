@@ -12,7 +12,7 @@ from kinacc.campaign import folder as campaigns
 from kinacc.campaign import report
 from kinacc.deployment.folder import robot_of
 from kinacc.report import campaign, fit_sections, study_sections, terminal
-from kinacc.report.page import FirstScreen, Page, Table
+from kinacc.report.page import Page, Part
 from kinacc.report.rendering import counted
 from kinacc.report.summarise import summarise
 from kinacc.report.summary import CalibrationSummary
@@ -50,11 +50,11 @@ def run(
         opened = campaigns.open_(summary.campaign.folder)
         sections.append(campaign.section(opened, report.tables(opened)))
     sections += [make(tables) for needed, make in _OF_THE_STUDY if needed in tables]
-    return Page(first_screen(summary, left_out), sections)
+    return page_of(summary, left_out, sections)
 
 
-def first_screen(summary: CalibrationSummary, left_out: Sequence[str]) -> FirstScreen:
-    """The answer, the errors before and after, and what is open.
+def page_of(summary: CalibrationSummary, left_out: Sequence[str], sections: Sequence[Part]) -> Page:
+    """The answer, the errors before and after, and what is open; then the sections.
 
     ``left_out``: tables made from others than those now there.
     """
@@ -75,17 +75,14 @@ def first_screen(summary: CalibrationSummary, left_out: Sequence[str]) -> FirstS
     if left_out:
         made = f"{', '.join(left_out)}: made from other tables than those here, so not shown"
         notes["Left out"] = [made, "kinacc check-results"]
-    return FirstScreen(
+    return Page(
         summary.name,
         about,
         (badge, not summary.synthetic and badge != "DATA: OK"),
         answers,
-        [
-            Table(
-                f"Errors at the same {count} ({where}) for every model",
-                errors.to_dict("records"),
-                columns,
-            )
-        ],
+        f"Errors at the same {count} ({where}) for every model",
+        errors.to_dict("records"),
+        columns,
         notes,
+        sections,
     )

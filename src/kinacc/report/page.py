@@ -21,18 +21,6 @@ from kinacc.report.rendering import environment, text_of
 
 
 @dataclass(frozen=True)
-class Table:
-    """Rows as dicts, and columns as [head, key] of texts or [head, key, format] of numbers.
-
-    The text under ``remark`` of a row stands behind it.
-    """
-
-    caption: str
-    rows: Sequence[Mapping[Any, object]]
-    columns: Sequence[Sequence[str]]
-
-
-@dataclass(frozen=True)
 class Part:
     """A section: the template of its ``key``, the values it shows, figures and charts by name.
 
@@ -55,26 +43,22 @@ class Part:
 
 
 @dataclass(frozen=True)
-class FirstScreen:
-    """The answer in sentences, tables, and notes by topic.
+class Page:
+    """A whole page: the answer in sentences, a table and notes by topic, then the evidence.
 
-    ``badge`` is a remark beside the title and whether it is a warning. A note that begins with
-    ``kinacc `` is shown as a command.
+    ``badge`` is a remark beside the title and whether it is a warning. ``rows`` are dicts, the text
+    under ``remark`` stands behind its row; ``columns`` are [head, key] of texts or
+    [head, key, format] of numbers. A note that begins with ``kinacc `` is shown as a command.
     """
 
     title: str
     subtitle: str
     badge: tuple[str, bool]
-    answers: Sequence[str] = ()
-    tables: Sequence[Table] = ()
-    notes: Mapping[str, Sequence[str]] = field(default_factory=dict)
-
-
-@dataclass(frozen=True)
-class Page:
-    """A whole page: the answer, then the evidence."""
-
-    first: FirstScreen
+    answers: Sequence[str]
+    caption: str
+    rows: Sequence[Mapping[Any, object]]
+    columns: Sequence[Sequence[str]]
+    notes: Mapping[str, Sequence[str]]
     sections: Sequence[Part]
 
 
@@ -84,7 +68,7 @@ def html(page: Page, marks: Mapping[str, object]) -> str:
     Parameters
     ----------
     page
-        First screen and sections.
+        Answer and sections.
     marks
         Provenance by name.
 

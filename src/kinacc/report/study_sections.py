@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -12,7 +12,7 @@ from kinacc.calibration.summary import reported_joints
 from kinacc.config.error_models import model_name
 from kinacc.figures import history_over_time
 from kinacc.figures.fig3 import cell_size
-from kinacc.figures.paper import FOOTNOTE, OF_MODELS, draw_iterations, draw_noise
+from kinacc.figures.paper import AT_MEASURED, OF_MODELS, draw_iterations, draw_noise, footnote
 from kinacc.kinematics.robot import Robot
 from kinacc.report import charts
 from kinacc.report.page import Part
@@ -78,33 +78,19 @@ def accuracy_map(tables: Tables, robot: Robot) -> Part:
     return Part("map", values, charts={"map": charts.accuracy_map(cells, *size)})
 
 
-@dataclass(frozen=True)
-class Truth:
-    """The largest error of the study's points in mm, and its origin: known or taken as true."""
-
-    largest_mm: float
-    what: str
-    footnote: str | None
-
-    @property
-    def called(self) -> str:
-        """Its name in pictures and tables."""
-        return "largest error, taken as true" if self.footnote else "true largest error"
-
-
-def truth(tables: Tables) -> Truth:
-    """The error that the study holds assessors to, of ``assessment_points``."""
-    points = pd.DataFrame(tables["assessment_points"])
-    measurements = pd.DataFrame(tables["measurements"])
-    largest = float(points["true_error_mm"].max())
-    joints = [name for name in points if name[:1] == "q" and name[1:].isdigit()]
-    measured = pd.MultiIndex.from_frame(measurements[joints])
-    if pd.MultiIndex.from_frame(points[joints]).isin(measured).all():
-        origin = "held-out errors of DH at measured poses, which contain the instrument's noise"
-        return Truth(largest, origin, FOOTNOTE)
-    if measurements["row"].notna().any():
-        return Truth(largest, "VEC minus DH of this arm: of models, not measured", OF_MODELS)
-    return Truth(largest, "VEC minus DH of the synthetic arm: known exactly", None)
+def truth(tables: Tables) -> dict[str, Any]:
+    """The error that the study holds assessors to: its size in mm, its origin and its name."""
+    note = footnote(tables)
+    origins = {
+        AT_MEASURED: "held-out errors of DH at measured poses, containing the instrument's noise",
+        OF_MODELS: "VEC minus DH of this arm: of models, not measured",
+        None: "VEC minus DH of the synthetic arm: known exactly",
+    }
+    return {
+        "largest_mm": pd.Series(tables["assessment_points"]["true_error_mm"]).max(),
+        "what": origins[note],
+        "called": "largest error, taken as true" if note else "true largest error",
+    }
 
 
 def study(tables: Tables) -> Part:
@@ -113,7 +99,7 @@ def study(tables: Tables) -> Part:
     rows = pd.DataFrame(summary)
     if "study" in tables:
         runs = pd.DataFrame(tables["study"])
-        runs["small"] = runs["assessed_mm"] < held_to.largest_mm
+        runs["small"] = runs["assessed_mm"] < held_to["largest_mm"]
         small = runs.groupby(["assessor", "noise_mm"])["small"].agg(["sum", "count"])
         texts = small["sum"].astype(str) + " of " + small["count"].astype(str)
         rows = rows.join(texts.rename("too_small"), on=["assessor", "noise_mm"])
@@ -123,13 +109,13 @@ def study(tables: Tables) -> Part:
         "truth": held_to,
         "rows": rows.assign(label=rows["assessor"].str.replace("_", " ")),
     }
-    figure = draw_noise(summary, held_to.largest_mm, held_to.footnote)
+    figure = draw_noise(summary, held_to["largest_mm"], footnote(tables))
     return Part("study", values, figures={"noise": figure})
 
 
 def histories(tables: Tables) -> Part:
     """``histories`` reading by reading: the simulations of Figs. 5 and 6."""
-    table, held_to = tables["histories"], truth(tables)
+    table, held_to, note = tables["histories"], truth(tables), footnote(tables)
     steps = pd.DataFrame(table).sort_values("iteration", kind="stable")
     final = steps.groupby("example").tail(1).set_index("example")
     final = final.loc[sorted(final.index, key=lambda name: [*_EXAMPLES, name].index(name))]
@@ -144,7 +130,7 @@ def histories(tables: Tables) -> Part:
         remark=("the nearest there is: " + final["rule"]).where(final["rule_met"] == 0, ""),
     )
     figures = {
-        called[name]: draw_iterations(table, name, held_to.largest_mm, held_to.footnote)
+        called[name]: draw_iterations(table, name, held_to["largest_mm"], note)
         for name in final.index
     }
     values = {

@@ -35,7 +35,7 @@ from kinacc.errors import Problem, refuse
 from kinacc.geometry import numbers
 from kinacc.progress import with_progress
 from kinacc.tables.columns import Columns, Tables
-from kinacc.tables.contract import ARTEFACTS, columns_of
+from kinacc.tables.contract import ARTEFACTS
 
 NM_PER_MM = 1_000_000
 SWITCHES = tuple(switch for cls in ASSESSORS.values() for switch in cls.switches)
@@ -290,9 +290,8 @@ def readings(rows: pd.DataFrame, true_mm: float) -> Columns:
 
 def _columns(artefact: str, table: pd.DataFrame) -> Columns:
     """Columns of an artefact, of a table that may have more."""
-    known = [column.name for column in ARTEFACTS[artefact].columns if column.name in table]
-    cells = table[known].astype(object)
-    return columns_of(artefact, cells.where(cells.notna(), None).to_dict("records"))
+    names = [column.name for column in ARTEFACTS[artefact].columns if column.name in table]
+    return {name: table[name].to_numpy() for name in names}
 
 
 def simulated(
