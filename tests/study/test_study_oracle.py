@@ -112,7 +112,7 @@ def test_parts_joined_in_any_order_give_the_same_bytes(rows):
         joined = {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}
         made = monte_carlo.summed_up(inputs | {"study_chunk": joined}, config)
         usual = monte_carlo.default_reading(rows, SMALL)
-        assert same(made["study"], monte_carlo._columns("study", usual))
+        assert same(made["study"], monte_carlo.columns_from("study", usual))
         assert same(made["study_summary"], monte_carlo.summary(usual, sizes.max()))
         assert same(made["readings"], monte_carlo.readings(rows, sizes.max()))
 

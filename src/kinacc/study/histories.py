@@ -20,6 +20,7 @@ from kinacc.config.records import Settings, of_section
 from kinacc.progress import with_progress
 from kinacc.study.monte_carlo import Visits, world_of
 from kinacc.tables.columns import Columns, Tables
+from kinacc.tables.contract import columns_from
 
 REJECTED, LARGER, KEPT = "rejected", "rejected_larger_eta", "not_rejected"
 
@@ -85,7 +86,7 @@ def histories(
         columns = {**example._asdict(), **settled, "noise_mm": settings.noise_mm}
         columns |= {"iteration": np.arange(len(steps)) + 1, "rule_met": int(example.rule_met)}
         tables.append(steps.assign(**columns, point=numbers[rows], true_mm=sizes[rows]))
-    return {name: values.to_numpy() for name, values in pd.concat(tables).items()}
+    return columns_from("histories", pd.concat(tables))
 
 
 def examples(

@@ -35,7 +35,7 @@ from kinacc.errors import Problem, refuse
 from kinacc.geometry import numbers
 from kinacc.progress import with_progress
 from kinacc.tables.columns import Columns, Tables
-from kinacc.tables.contract import ARTEFACTS
+from kinacc.tables.contract import columns_from
 
 NM_PER_MM = 1_000_000
 SWITCHES = tuple(switch for cls in ASSESSORS.values() for switch in cls.switches)
@@ -278,20 +278,14 @@ def statistics(rows: pd.DataFrame, keys: Sequence[str], true_mm: float) -> pd.Da
 
 def summary(study: pd.DataFrame, true_mm: float) -> Columns:
     """Columns of ``study_summary``: each assessor and noise against the true accuracy (mm)."""
-    return _columns("study_summary", ordered(statistics(study, KEYS, true_mm), KEYS))
+    return columns_from("study_summary", ordered(statistics(study, KEYS, true_mm), KEYS))
 
 
 def readings(rows: pd.DataFrame, true_mm: float) -> Columns:
     """Columns of ``readings``: every reading of the assessors that have more than one."""
     switched = [name for name, cls in ASSESSORS.items() if cls.switches]
     rows, keys = rows[rows["assessor"].isin(switched)], ["assessor", *SWITCHES, "noise_mm"]
-    return _columns("readings", ordered(statistics(rows, keys, true_mm), keys))
-
-
-def _columns(artefact: str, table: pd.DataFrame) -> Columns:
-    """Columns of an artefact, of a table that may have more."""
-    names = [column.name for column in ARTEFACTS[artefact].columns if column.name in table]
-    return {name: table[name].to_numpy() for name in names}
+    return columns_from("readings", ordered(statistics(rows, keys, true_mm), keys))
 
 
 def simulated(
@@ -314,7 +308,7 @@ def simulated(
         settings["seed"],
         assessors(settings["study"], settings.get("all_readings", True)),
     )
-    return {"study_chunk": _columns("study_chunk", ordered(rows))}
+    return {"study_chunk": columns_from("study_chunk", ordered(rows))}
 
 
 def summed_up(inputs: Tables, settings: Settings) -> Tables:
@@ -323,7 +317,7 @@ def summed_up(inputs: Tables, settings: Settings) -> Tables:
     rows = ordered(pd.DataFrame(dict(inputs["study_chunk"])))
     default = default_reading(rows, settings["study"])
     return {
-        "study": _columns("study", default),
+        "study": columns_from("study", default),
         "study_summary": summary(default, true_mm),
         "readings": readings(rows, true_mm),
     }

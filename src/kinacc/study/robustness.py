@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import numpy as np
+import pandas as pd
 
 from kinacc.config.error_models import ALWAYS
 from kinacc.config.records import Settings
@@ -11,7 +11,7 @@ from kinacc.study import in_memory
 from kinacc.study.claims.evaluate import evaluate
 from kinacc.synthetic.accepted import further_draws
 from kinacc.tables.columns import Columns, Tables
-from kinacc.tables.contract import columns_of
+from kinacc.tables.contract import columns_from, columns_of
 
 STAGES = (
     *ALWAYS,
@@ -34,18 +34,13 @@ def run(inputs: Tables, settings: Settings) -> Tables:
     part = settings.get("part") or {"number": 1, "of": 1}
     chosen = draws[part["number"] - 1 :: part["of"]]
     config = {name: value for name, value in settings.items() if name != "part"}
-    parts = [
-        claims_on(draw, config) for draw in with_progress(chosen, "further synthetic arms studied")
-    ]
-    return {
-        "robustness_chunk": {
-            name: np.concatenate([empty, *(part[name] for part in parts)])
-            for name, empty in columns_of("robustness_chunk", []).items()
-        }
-    }
+    rows = []
+    for draw in with_progress(chosen, "further synthetic arms studied"):
+        rows += claims_on(draw, config).to_dict("records")
+    return {"robustness_chunk": columns_of("robustness_chunk", rows)}
 
 
-def claims_on(draw: int, config: Settings) -> Columns:
+def claims_on(draw: int, config: Settings) -> pd.DataFrame:
     """Rows of ``robustness`` of one accepted draw under the configuration of a data set."""
     measurements = config["measurements"]
     synthetic = {**measurements["synthetic"], "draw": draw}
@@ -53,13 +48,11 @@ def claims_on(draw: int, config: Settings) -> Columns:
     tables: dict[str, Columns] = {}
     for name in ("measurements", *STAGES):
         tables |= in_memory.lean(name, settings, tables)
-    claims = evaluate(tables, paper_arm=True)
-    rows = {name: claims[name] for name in ("claim", "reproduced", "verdict")}
-    return {"draw": np.full(len(claims["claim"]), draw), **rows}
+    claims = pd.DataFrame(evaluate(tables, paper_arm=True)).assign(draw=draw)
+    return claims[["draw", "claim", "reproduced", "verdict"]]
 
 
 def gathered(inputs: Tables, settings: Settings) -> Tables:
     """Return ``robustness``: by draw, then in the order of the claims."""
-    rows = inputs["robustness_chunk"]
-    order = np.argsort(rows["draw"], kind="stable")
-    return {"robustness": {name: np.asarray(column)[order] for name, column in rows.items()}}
+    rows = pd.DataFrame(dict(inputs["robustness_chunk"])).sort_values("draw", kind="stable")
+    return {"robustness": columns_from("robustness", rows)}

@@ -14,6 +14,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import pandas as pd
 import yaml
 
 from kinacc.tables import allowed
@@ -73,3 +74,9 @@ def columns_of(artefact: str, rows: Iterable[Mapping[str, Any] | Sequence[Any]])
         kind = np.float64 if column.nullable else kinds.get(column.kind, np.float64)
         columns[name] = texts(cells) if column.kind == "text" else np.array(cells, kind)
     return columns
+
+
+def columns_from(artefact: str, table: pd.DataFrame) -> Columns:
+    """Columns of an artefact, of a table that may have more."""
+    names = [column.name for column in ARTEFACTS[artefact].columns if column.name in table]
+    return {name: table[name].to_numpy() for name in names}

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 import warnings
 from collections.abc import Mapping
 
@@ -15,7 +14,7 @@ from kinacc.study.claims.claim import Claim, number_claims, number_values, sente
 from kinacc.study.claims.map_sentences import map_values
 from kinacc.study.claims.study_sentences import history_values, points_values, study_values
 from kinacc.tables.columns import Columns, Tables
-from kinacc.tables.contract import columns_of
+from kinacc.tables.contract import columns_from
 
 SECTIONS = ("measurements", "calibration", "evaluation", "map", "study", "histories")
 _VALUES = {
@@ -59,25 +58,13 @@ def evaluate(
     dict
         Columns of ``claims``. A claim without its evidence is ``not comparable``.
     """
-    rows, values = [], values_of(tables)
-    for claim in all_claims():
-        judged = paper_arm or not claim.arm_specific
-        value = float(values.get(claim.id, math.nan)) if judged else math.nan
-        rows.append(
-            {
-                "claim": claim.id,
-                "statement": claim.statement,
-                "statistic": claim.statistic,
-                "evidence": f"{claim.evidence}.parquet",
-                "paper": claim.paper,
-                "reproduced": value,
-                "tolerance": claim.tolerance,
-                "verdict": verdict(claim, value),
-                "share": (shares or {}).get(claim.id, math.nan),
-                "used_to_choose": claim.used_to_choose,
-            }
-        )
-    return columns_of("claims", rows)
+    table = pd.DataFrame(all_claims()).rename(columns={"id": "claim"})
+    is_judged = paper_arm | ~table["arm_specific"]
+    table["reproduced"] = table["claim"].map(values_of(tables)).astype(float).where(is_judged)
+    table["verdict"] = list(map(verdict, all_claims(), table["reproduced"]))
+    table["share"] = table["claim"].map(shares or {}).astype(float)
+    table["evidence"] += ".parquet"
+    return columns_from("claims", table)
 
 
 def _unlike_the_paper(settings: Settings) -> list[str]:
