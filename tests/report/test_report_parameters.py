@@ -39,12 +39,12 @@ def vec_model(order: int = 2, **coefficients: float) -> dict:
 def test_differences_have_their_unit_and_standard_deviation():
     model = {"joint": np.arange(1, 5)}
     for name in PARAMETERS:
-        model |= {name: getattr(robot().dh, name).copy(), f"std_{name}": np.full(4, 0.1)}
+        model[name] = getattr(robot().dh, name).copy()
     model["d_mm"][3] += 1.5
     model["alpha_rad"][1] -= 0.0004
-    model["std_alpha_rad"][:] = 0.0001
     names = ["j4.d_mm", "j2.alpha_rad", "j3.beta_rad"]
     identified = {"parameter": names, "status": ["identified"] * 3}
+    identified["std"] = [0.1, 0.0001, 0.0001]
     found = fit_sections.dh_parameters(model, identified, robot()).set_index("called")
     shown = found[["nominal", "calibrated", "difference", "std"]]
     assert shown.loc["d of joint 4"].tolist() == pytest.approx([100.0, 101.5, 1.5, 0.1])

@@ -16,7 +16,7 @@ from kinacc.synthetic.physical import Visits
 from kinacc.synthetic.plan import calibration_run, measured
 
 NOTHING = Scales(0.0, 0.0, 0.0, 0.0)
-SETTINGS = {"draw": 1, "poses": 10, "tracker_noise_mm": 0.0}
+SETTINGS = {"draw": 1, "poses": 10, "tracker_noise_mm": 0.0, "wave_decay": 1.0, "ripple": 1.0}
 
 
 @pytest.fixture(scope="module")

@@ -20,7 +20,7 @@ from kinacc.calibration.uncertainty import is_angle
 from kinacc.config.error_models import MEASURED, NOMINAL, PLAINEST, Comparison, model_name
 from kinacc.deployment.folder import uncertainty
 from kinacc.figures.calibration import draw_joint_errors
-from kinacc.kinematics.dh import PARAMETERS, DHModel
+from kinacc.kinematics.dh import DHModel
 from kinacc.kinematics.robot import Robot
 from kinacc.kinematics.vec import VECModel
 from kinacc.measurements.row_names import RowNames
@@ -161,16 +161,15 @@ def dh_parameters(model: Columns, identified: Columns, robot: Robot) -> pd.DataF
     The angle beta is left out of joints that have none.
     """
     fitted = DHModel.from_columns(model, robot.dh)
-    order = np.argsort(model["joint"], kind="stable")
-    std = np.stack([np.asarray(model[f"std_{name}"])[order] for name in PARAMETERS], axis=1)
-    table = pd.DataFrame({"name": fitted.names, "nominal": robot.dh.start})
-    table["calibrated"], table["std"] = fitted.start, std.ravel()
-    status = dict(zip(identified["parameter"], identified["status"], strict=True))
-    table["status"] = table["name"].map(status).fillna(FIXED)
-    table["called"] = table["name"].map(parameter_name)
+    table = pd.DataFrame({"parameter": fitted.names, "nominal": robot.dh.start})
+    table["calibrated"] = fitted.start
+    known = pd.DataFrame(identified, columns=["parameter", "status", "std"])
+    table = table.merge(known, "left")
+    table["status"] = table["status"].fillna(FIXED)
+    table["called"] = table["parameter"].map(parameter_name)
     is_zero = (table[["nominal", "calibrated"]] == 0.0).all(axis=1)
-    unused = table["name"].str.endswith("beta_rad") & (table["status"] == FIXED) & is_zero
-    angle = table["name"].map(is_angle)
+    unused = table["parameter"].str.endswith("beta_rad") & (table["status"] == FIXED) & is_zero
+    angle = table["parameter"].map(is_angle)
     scale = np.where(angle, 1e3, 1.0)
     table["difference"] = (table["calibrated"] - table["nominal"]) * scale
     table["std"] *= scale

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 
 from kinacc.config.records import Settings
@@ -12,7 +10,7 @@ from kinacc.geometry import quaternion_from_rotation
 from kinacc.kinematics.region import Attitude
 from kinacc.kinematics.robot import Robot
 from kinacc.synthetic.accepted import AcceptedDraw, accepted_draw
-from kinacc.synthetic.draw import AS_TUNED, physical_robot
+from kinacc.synthetic.draw import AS_TUNED, Roughness, physical_robot
 from kinacc.synthetic.plan import DOWN, Run, calibration_run, measured
 
 ARM = "mh180"  # whose draws there are
@@ -26,8 +24,8 @@ def measure(robot: Robot, settings: Settings, attitude: Attitude = DOWN) -> dict
     robot : Robot
         The nominal arm; only the one named ``ARM`` can be measured.
     settings : mapping
-        Those of ``measurements.synthetic``; without a roughness the draw has the one it was
-        accepted with.
+        Those of ``measurements.synthetic``; another roughness than the one a draw was accepted
+        with makes another arm of it.
     attitude : Attitude
         Orientation of the flange about which the poses are planned.
 
@@ -46,15 +44,17 @@ def measure(robot: Robot, settings: Settings, attitude: Attitude = DOWN) -> dict
         what = f"is synthetic, but robot {robot.name} is not the arm that was synthesised"
         fix = "give the measurements of this robot in a file (measurements.source: file)"
         raise input_error("measurements.source", what, f"robot: {ARM}", fix)
-    stated = {name: settings[name] for name in AS_TUNED._fields if name in settings}
-    draw = replace(accepted_draw(int(settings["draw"])), roughness=AS_TUNED._replace(**stated))
+    draw = accepted_draw(int(settings["draw"]))
     run = calibration_run(robot, int(settings["poses"]), draw.seed, attitude)
-    return columns(draw, run, float(settings["tracker_noise_mm"]))
+    roughness = Roughness(settings["wave_decay"], settings["ripple"])
+    return columns(draw, run, float(settings["tracker_noise_mm"]), roughness)
 
 
-def columns(draw: AcceptedDraw, run: Run, tracker_noise_mm: float) -> dict[str, np.ndarray]:
+def columns(
+    draw: AcceptedDraw, run: Run, tracker_noise_mm: float, roughness: Roughness = AS_TUNED
+) -> dict[str, np.ndarray]:
     """Columns of a calibration run on the arm of ``draw``, as ``measure`` returns them."""
-    arm = physical_robot(draw.seed, draw.scales, draw.geometry, draw.roughness)
+    arm = physical_robot(draw.seed, draw.scales, draw.geometry, roughness)
     poses = measured(arm, run, tracker_noise_mm)
     quaternion, count = quaternion_from_rotation(poses.rotation), len(poses.position_mm)
     return {

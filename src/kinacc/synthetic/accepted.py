@@ -11,7 +11,7 @@ import pandas as pd
 
 from kinacc.errors import input_error
 from kinacc.kinematics.dh import DHModel
-from kinacc.synthetic.draw import AS_TUNED, Roughness, Scales
+from kinacc.synthetic.draw import Scales
 
 FILE = "accepted_draws.csv"
 GEOMETRY = ("theta_offset_rad", "d_mm", "a_mm", "alpha_rad")
@@ -20,15 +20,11 @@ JOINTS = 6
 
 @dataclass(frozen=True)
 class AcceptedDraw:
-    """One arm: its ``seed``, the ``scales`` of its effects, its DH ``geometry``.
-
-    Another ``roughness`` than the one it was accepted with makes another arm of it.
-    """
+    """One arm: its ``seed``, the ``scales`` of its effects, its DH ``geometry``."""
 
     seed: int
     scales: Scales
     geometry: DHModel
-    roughness: Roughness = AS_TUNED
 
 
 def geometry_columns() -> list[str]:
@@ -38,10 +34,11 @@ def geometry_columns() -> list[str]:
 
 
 @cache
-def rows() -> list[dict[str, str]]:
+def rows() -> list[dict[str, float]]:
     """Rows of the table of accepted draws, in order of their seeds; lines with # are remarks."""
     with (resources.files("kinacc") / "synthetic" / FILE).open(encoding="utf-8") as file:
-        return pd.read_csv(file, comment="#", dtype=str).to_dict("records")
+        table = pd.read_csv(file, comment="#", float_precision="round_trip")
+    return table.to_dict("records")
 
 
 def accepted_draw(number: int) -> AcceptedDraw:
@@ -64,8 +61,8 @@ def accepted_draw(number: int) -> AcceptedDraw:
     """
     _require("measurements.synthetic.draw", number + 1)
     row = rows()[number]
-    values = np.array([float(row[name]) for name in geometry_columns()]).reshape(JOINTS, -1)
-    scales = Scales(*(float(row[name]) for name in Scales._fields))
+    values = np.array([row[name] for name in geometry_columns()]).reshape(JOINTS, -1)
+    scales = Scales(*(row[name] for name in Scales._fields))
     geometry = dict(zip(GEOMETRY, values.T, strict=True))
     return AcceptedDraw(int(row["seed"]), scales, DHModel(**geometry, beta_rad=np.zeros(JOINTS)))
 

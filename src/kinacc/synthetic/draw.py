@@ -84,8 +84,8 @@ def _smooth(rng: np.random.Generator, scales: Scales, decay: float) -> Smooth:
     size[3, 5] = size[4:, 3:] = _WRIST_MRAD * 1e-3 * scales.smooth_wrist
     shape = (6, 6, HALF_PERIODS)
     number = np.arange(1.0, HALF_PERIODS + 1)
-    usual, fallen = number**AS_TUNED.wave_decay, number**decay
-    same_size = np.linalg.norm(1.0 / usual) / np.linalg.norm(1.0 / fallen)
+    fallen = number**decay
+    same_size = np.linalg.norm(1.0 / number) / np.linalg.norm(1.0 / fallen)
     amplitude = size[..., None] * same_size / fallen * rng.uniform(0.5, 1.5, shape)
     low, high = np.deg2rad(RANGE_DEG).T
     return Smooth(low, high, amplitude, rng.uniform(0.0, 2.0 * np.pi, shape))
