@@ -197,24 +197,24 @@ class CampaignNoise:
     def taken(self, error: float) -> NoiseTaken:
         """The noise for bounds that may err with this probability; not where it is ``missing``."""
         part, points = _NOISE_PART * error, self.ledger.candidates.points
+        freedom = self.settings.noise_freedom or self.estimating
         if self.is_known:
             value, reason = self._stated_or_shown()
-            return NoiseTaken(value, np.full(points, value), 1.0, value, reason)
-        if self.is_bounded:
+            least, most = 1.0, value
+        elif self.is_bounded:
             rows = np.array(self.ledger.visited[: self.first])
             first = np.array([self.ledger.readings_of(row, 1)[0][0] for row in rows])
             value = largest_factor(self.ledger.candidates, rows, first, part)
-            reason = Reason("noise_bounded", {"factor": value})
-            return NoiseTaken(value, np.full(points, value), 0.0, value, reason)
-        freedom = self.settings.noise_freedom or self.estimating
-        least, most = factor_limit(freedom, part), factor_limit(freedom, 1.0 - part)
-        if self._guarded:
-            reason = Reason("noise_limited", {"factor": most, "freedom": freedom})
-            return NoiseTaken(most, np.full(points, most), least, most, reason)
-        value, factors = estimated_factor(self.contrasts, self.estimating, points)
-        code = "noise_estimated" if self.estimating else "noise_tested"
-        reason = Reason(code, {"factor": value, "freedom": freedom})
-        return NoiseTaken(value, factors, value * least, value * most, reason)
+            least, most, reason = 0.0, value, Reason("noise_bounded", {"factor": value})
+        else:
+            least, most = factor_limit(freedom, part), factor_limit(freedom, 1.0 - part)
+            if not self._guarded:
+                value, by_point = estimated_factor(self.contrasts, self.estimating, points)
+                code = "noise_estimated" if self.estimating else "noise_tested"
+                reason = Reason(code, {"factor": value, "freedom": freedom})
+                return NoiseTaken(value, by_point, value * least, value * most, reason)
+            value, reason = most, Reason("noise_limited", {"factor": most, "freedom": freedom})
+        return NoiseTaken(value, np.full(points, value), least, most, reason)
 
     def alarms(self) -> tuple[Reason, ...]:
         """What readings of the same block say against the noise stated, and against normal ones."""

@@ -105,7 +105,7 @@ class SearchAndConfirm(AdaptiveAssessor):
 
     def enough_for_all(self, points: int) -> int:
         """Measurements with which the statement on all ``points`` candidates assumes nothing."""
-        return hardly_missed(points, MISSED * (1.0 - self.confidence))
+        return points - math.floor(MISSED * (1.0 - self.confidence) * points)
 
     def visit(self, points: int) -> int:
         """How many of the candidates are visited in any case."""
@@ -190,7 +190,6 @@ class SearchAndConfirmCampaign(Campaign):
         self._direction = np.eye(3)[0]
         self._block, self._begins = 0, True
         self._mean_mm = np.zeros((points, 3))  # at the ends of blocks
-        self._size_mm = np.full(points, -1.0)  # of these
 
     def boundary_of(self, error: float, freedom: float = math.inf) -> Boundary:
         """The boundary of the looks of this campaign for an error of the upper limits."""
@@ -235,7 +234,6 @@ class SearchAndConfirmCampaign(Campaign):
         # A planned reading ends a block only where the point is looked at.
         if is_due or not (self._left or is_planned):
             self._mean_mm[point] = ledger.mean_mm[point]
-            self._size_mm[point] = np.linalg.norm(self._mean_mm[point])
         remaining = self.settings.measurements - ledger.taken - self.plan.left(ledger.taken)
         if not self._left and len(ledger.visited) >= self.first and remaining > 0:
             self._begin_block(remaining)
@@ -246,7 +244,8 @@ class SearchAndConfirmCampaign(Campaign):
 
     def _begin_block(self, remaining: int) -> None:
         """Choose where the next readings are taken, and how many of them."""
-        missing, likely = self.average.missing, int(np.argmax(self._size_mm))
+        sizes_mm = np.linalg.norm(self._mean_mm, axis=1)
+        missing, likely = self.average.missing, int(np.argmax(sizes_mm))
         row, count = likely, remaining
         if remaining > missing:
             for place in np.argsort(-self.looks.upper_mm[self.ledger.visited], kind="stable"):
@@ -262,7 +261,7 @@ class SearchAndConfirmCampaign(Campaign):
         self._counted = row == likely and missing > 0 and is_confirmed
         self._row, self._left = row, min(count, missing) if self._counted else count
         self._begins = True
-        size_mm = self._size_mm.item(row)
+        size_mm = sizes_mm.item(row)
         self._direction = self._mean_mm[row] / size_mm if size_mm > 0.0 else np.eye(3)[0]
 
     def statements(self) -> tuple[Statement, ...]:
@@ -358,11 +357,6 @@ class SearchAndConfirmCampaign(Campaign):
         else:
             bound_mm = self.looks.largest_lower_mm(self._single_factor())
         return max(bound_mm - self.settings.allowance_mm, 0.0)
-
-
-def hardly_missed(points: int, error: float) -> int:
-    """Return the number of random points that hold the largest of ``points`` but for ``error``."""
-    return next(drawn for drawn in range(points + 1) if points - drawn <= error * points)
 
 
 def excepted(points: int, drawn: int, error: float) -> int:

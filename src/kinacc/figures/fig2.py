@@ -12,7 +12,8 @@ from kinacc.config.records import Settings
 from kinacc.figures import style
 from kinacc.kinematics import dh
 from kinacc.kinematics import robot as robots
-from kinacc.study.evaluation import equipped
+from kinacc.kinematics.region import Cylinder
+from kinacc.study.evaluation import cylinder, equipped
 from kinacc.tables.columns import Tables
 
 VIEW_DEG = (24.0, -58.0)  # elevation, azimuth
@@ -33,7 +34,7 @@ def run(inputs: Tables, settings: Settings) -> Figure:
         model,
         robot.dh_joints(reported),
         tool_mm=tool.position_mm,
-        cylinder=evaluation["cylinder"] if evaluation["space"] == "cylinder" else None,
+        space=cylinder(evaluation) if evaluation["space"] == "cylinder" else None,
         measured=evaluation["space"] == "measured",
         dataset=settings.get("dataset"),
     )
@@ -44,22 +45,20 @@ def draw(
     q_rad: np.ndarray,
     *,
     tool_mm: np.ndarray,
-    cylinder: Settings | None = None,
+    space: Cylinder | None = None,
     measured: bool = False,
     dataset: str | None = None,
 ) -> Figure:
     """Draw the operating points and the arm at the one nearest to their middle, in mm.
 
     ``q_rad`` (n, k) are the DH joint angles of the points, ``tool_mm`` (3,) the tool centre point
-    in the flange frame; ``cylinder`` is the evaluation space as a sector about the axis of joint 1
-    with ``inner_radius_mm``, ``radial_span_mm``, ``bottom_mm``, ``height_mm`` and ``angle_deg``
-    (two values); ``measured``: the points are poses that were measured. Everything is in the robot
-    base frame.
+    in the flange frame; ``space`` is the evaluation space; ``measured``: the points are poses that
+    were measured. Everything is in the robot base frame.
     """
     q_rad = q_rad[np.isfinite(q_rad).all(axis=1)]
     flange = dh.forward(model, q_rad)
     points_mm = flange.position_mm + flange.rotation @ tool_mm
-    edges = [] if cylinder is None else _edges(cylinder)
+    edges = [] if space is None else _edges(space)
     middle = np.concatenate(edges or [points_mm]).mean(axis=0)
     nearest = np.linalg.norm(points_mm - middle, axis=1).argmin()
     kind = "measured poses of the study" if measured else "operating points"
@@ -100,11 +99,11 @@ def _arm(ax: Axes3D, model: dh.DHModel, q_rad: np.ndarray, tool_mm: np.ndarray) 
                 zorder=4)  # fmt: skip
 
 
-def _edges(cylinder: Settings) -> list[np.ndarray]:
+def _edges(space: Cylinder) -> list[np.ndarray]:
     """Edges of the evaluation space: four arcs and two ends."""
-    inner, low = float(cylinder["inner_radius_mm"]), float(cylinder["bottom_mm"])
-    outer, high = inner + cylinder["radial_span_mm"], low + cylinder["height_mm"]
-    turn = np.radians(np.linspace(cylinder["angle_deg"][0], cylinder["angle_deg"][1], 31))
+    turn = np.linspace(space.angle_min_rad, space.angle_max_rad, 31)
+    inner, outer = space.inner_radius_mm, space.outer_radius_mm
+    low, high = space.bottom_mm, space.top_mm
     corners = [(inner, low), (outer, low), (outer, high), (inner, high)]
     arcs = [
         np.stack([r * np.cos(turn), r * np.sin(turn), np.full(turn.size, h)], axis=-1)

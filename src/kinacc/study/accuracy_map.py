@@ -11,10 +11,11 @@ from collections.abc import Mapping
 from typing import NamedTuple
 
 import numpy as np
+import pandas as pd
 
 from kinacc.geometry import IDENTITY, Pose, compose, invert
 from kinacc.kinematics import inverse
-from kinacc.kinematics.inverse import Status
+from kinacc.kinematics.inverse import Status, limits
 from kinacc.kinematics.inverse.newton import pose_error
 from kinacc.kinematics.model import ErrorModel, JointState
 from kinacc.kinematics.region import SLICE, Cells, Cylinder, Orientations, tool_poses
@@ -71,19 +72,6 @@ class PosesWanted(NamedTuple):
     frame: str = SLICE
 
 
-class AccuracyMap(NamedTuple):
-    """One row per cell, (n,) but for ``worst_q_rad`` (n, k); see ``accuracy_map``."""
-
-    position_max_mm: np.ndarray
-    orientation_max_mrad: np.ndarray
-    worst_branch: np.ndarray
-    orientation_worst_branch: np.ndarray
-    solutions: np.ndarray
-    wanted: np.ndarray
-    extrapolating: np.ndarray
-    worst_q_rad: np.ndarray
-
-
 def errors_at(models: Models, q_rad: np.ndarray) -> np.ndarray:
     """Reference minus assessed model at joints (n, k), as (n, 6): tool position in mm, turn in rad.
 
@@ -111,24 +99,25 @@ def joints_of(robot: Robot, models: Models, tool: Pose, invert_with: str) -> inv
     return inverse.solve(robot, chosen.model, flange, branches, models.travel, models.range_rad)
 
 
-def accuracy_map(robot: Robot, models: Models, cells: Cells, wanted: PosesWanted) -> AccuracyMap:
+def accuracy_map(robot: Robot, models: Models, cells: Cells, wanted: PosesWanted) -> pd.DataFrame:
     """Largest errors at cells (n,) over the orientations ``wanted`` and every branch.
 
-    ``solutions`` counts the combinations reached within the joint limits and within the range of
-    the reference, of ``wanted``; only those enter the maxima, since beyond its range it says
-    nothing. ``extrapolating`` counts the combinations left out for that reason alone.
-    ``worst_q_rad`` are the DH joints of the largest position error. Cells without a solution have
-    NaN maxima and joints, and None branches, which read ``X+ Y- Z0, front-up-flip``.
+    The columns of ``accuracy_map``, a row a cell. ``solutions`` counts the combinations reached
+    within the joint limits and within the range of the reference, of ``wanted``; only those enter
+    the maxima, since beyond its range it says nothing. ``extrapolating`` counts the combinations
+    left out for that reason alone. ``q1`` .. are the reported joints of the largest position error.
+    Cells without a solution
+    have no maxima, joints and branches, which read ``X+ Y- Z0, front-up-flip``.
     """
     blocks = range(0, len(cells.radius_mm), _CELLS_PER_BLOCK)
     parts = [
         _block(robot, models, Cells(*(axis[i : i + _CELLS_PER_BLOCK] for axis in cells)), wanted)
         for i in blocks
     ]
-    return AccuracyMap(*(np.concatenate(columns) for columns in zip(*parts, strict=True)))
+    return pd.concat(parts, ignore_index=True)
 
 
-def _block(robot: Robot, models: Models, cells: Cells, wanted: PosesWanted) -> AccuracyMap:
+def _block(robot: Robot, models: Models, cells: Cells, wanted: PosesWanted) -> pd.DataFrame:
     orientations, branches = wanted.orientations, inverse.machining_branches(robot)
     count, turns = len(cells.radius_mm), len(orientations.names)
     repeated = Cells(*(np.repeat(axis, turns) for axis in cells))
@@ -140,13 +129,15 @@ def _block(robot: Robot, models: Models, cells: Cells, wanted: PosesWanted) -> A
     size = np.full((2, *reached.shape), -np.inf)  # of position and orientation
     size[:, reached] = np.linalg.norm(error.reshape(-1, 2, 3), axis=2).T * [[1.0], [1e3]]
     size = size.reshape(2, count, tried)
-    solutions = reached.reshape(count, tried).sum(axis=1)
-    outside = (solved.status == Status.OUTSIDE_RANGE).reshape(count, tried).sum(axis=1)
+    outside = (solved.status == Status.OUTSIDE_RANGE).reshape(count, tried)
     place, largest = size.argmax(axis=2), size.max(axis=2)
     names = [f"{turn}, {branch}" for turn in orientations.names for branch in branches]
     worst = np.array(names, dtype=object)[place]
     q_rad = solved.q_rad.reshape(count, tried, -1)[np.arange(count), place[0]]
-    unreached = solutions == 0
-    q_rad[unreached], largest[:, unreached], worst[:, unreached] = np.nan, np.nan, None
-    counts = solutions, np.full(count, tried), outside
-    return AccuracyMap._make([*largest, *worst, *counts, q_rad])
+    joints = limits.reported_joints(robot, q_rad)
+    table = pd.DataFrame(joints, columns=[f"q{n}" for n in range(1, joints.shape[1] + 1)])
+    table["position_max_mm"], table["orientation_max_mrad"] = largest
+    table["worst_branch"], table["orientation_worst_branch"] = worst
+    solutions = reached.reshape(count, tried).sum(axis=1)
+    table.loc[solutions == 0, :] = np.nan
+    return table.assign(solutions=solutions, wanted=tried, extrapolating=outside.sum(axis=1))

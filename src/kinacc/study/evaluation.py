@@ -66,15 +66,10 @@ def mapped(inputs: Tables, settings: Settings) -> Tables:
     slice_deg = np.repeat(slices_deg, len(cells.radius_mm) // len(slices_deg))
     arm = robot.load(settings["robot"])
     models = equipped(inputs, settings["evaluation"], arm)
-    result = accuracy_map(arm, models, cells, wanted)._asdict()
-    joints = limits.reported_joints(arm, result.pop("worst_q_rad"))
-    columns = {
-        "slice_deg": slice_deg,
-        "radius_mm": cells.radius_mm,
-        "height_mm": cells.height_mm,
-        **result,
-    }
-    return {"accuracy_map": columns | _numbered("q", joints)}
+    table = accuracy_map(arm, models, cells, wanted).assign(
+        slice_deg=slice_deg, radius_mm=cells.radius_mm, height_mm=cells.height_mm
+    )
+    return {"accuracy_map": {name: column.to_numpy() for name, column in table.items()}}
 
 
 def points(inputs: Tables, settings: Settings) -> Tables:
