@@ -78,7 +78,7 @@ def test_a_line_that_is_none_of_this_campaign_is_refused(begun, entry):
         (("--set", "confidence=[1]"), "setting confidence"),
         (("--set", "noise_margin=" + "[" * 5000), "setting noise_margin"),
         (("--set", "noise_margin=wide"), "setting noise_margin"),
-        (("--set", "noise_freedom=40"), "0 where noise is known"),
+        (("--set", "noise_freedom=40"), "0, or with noise: estimated"),
         (("--noise", "estimate", "--set", "noise_freedom=5"), "at least 30"),
         (("--noise", "estimate", "--wrong-readings", "1%"), "0 where the campaign estimates"),
         (("--arm-mm", "0.1"), "only of visits"),

@@ -35,9 +35,7 @@ LIMITS = np.radians(oracle.MH180_LIMITS_DEG).T
 def two_models(vec, dh, vec_tool=geometry.IDENTITY, dh_tool=geometry.IDENTITY, travel=None):
     """A VEC model as the true arm and a DH model under assessment."""
     by_name = {"vec": (vec, vec_tool), "dh": (dh, dh_tool)}
-    return accuracy_map.Models(
-        {name: accuracy_map.Equipped(*each) for name, each in by_name.items()}, travel
-    )
+    return {name: accuracy_map.Equipped(*each, travel=travel) for name, each in by_name.items()}
 
 
 @pytest.fixture(scope="module")
@@ -112,15 +110,13 @@ def test_errors_at_joints_are_true_minus_model_tool(arms, models):
 def test_joints_of_a_model_in_a_base_of_its_own_reach_the_wanted_poses(models):
     turn = Rotation.from_rotvec([0.02, -0.01, 0.03]).as_matrix()
     base = geometry.Pose(turn, np.array([5.0, -3.0, 8.0]))
-    placed = models.by_name["dh"]._replace(base=base)
-    wanted = placed.tool_poses(
-        np.random.default_rng(4).uniform(0.6 * LOW, 0.6 * HIGH, (5, 6)), None
-    )
-    moved = models._replace(by_name=models.by_name | {"dh": placed})
+    placed = models["dh"]._replace(base=base)
+    wanted = placed.tool_poses(np.random.default_rng(4).uniform(0.6 * LOW, 0.6 * HIGH, (5, 6)))
+    moved = models | {"dh": placed}
     found = accuracy_map.joints_of(ARM, moved, wanted, "dh")
     usable = found.status == inverse.Status.FOUND
     assert usable.any(axis=1).all()
-    again = placed.tool_poses(found.q_rad[usable], None)
+    again = placed.tool_poses(found.q_rad[usable])
     rows = np.nonzero(usable)[0]
     np.testing.assert_allclose(again.position_mm, wanted.position_mm[rows], atol=1e-6)
 
@@ -229,16 +225,16 @@ def test_a_configured_tool_stands_on_the_flange_as_that_is_turned():
     settings = defaults()["evaluation"] | {"tool_mm": [40.0, -25.0, 130.0], "travel_direction": -1}
     models = evaluation.equipped({}, settings, replace(ARM, flange=flange))
     wanted = TILTED @ settings["tool_mm"] + flange.position_mm
-    np.testing.assert_allclose(models.by_name["nominal"].tool.position_mm, wanted, atol=1e-9)
-    assert models.travel.tolist() == [-1.0] * 6
+    np.testing.assert_allclose(models["nominal"].tool.position_mm, wanted, atol=1e-9)
+    assert models["dh"].travel.tolist() == [-1.0] * 6
 
 
 def test_the_base_of_a_fitted_vec_model_stands_in_that_of_the_dh_model():
     """A reading is at one place of the instrument's frame, whichever model predicts it."""
     results = RESULTS / "ur10_d"
     models = evaluation.equipped(tables_in(results), defaults()["evaluation"], robot.load("ur10"))
-    frames, base = tables.models(results).frames, models.by_name["vec"].base
+    frames, base = tables.models(results).frames, models["vec"].base
     point_mm = np.array([700.0, -300.0, 500.0])  # in the first frame of the VEC model
     found = frames["dh", "base"] @ [*(base.rotation @ point_mm + base.position_mm), 1.0]
     np.testing.assert_allclose(found, frames["vec", "base"] @ [*point_mm, 1.0], atol=1e-9)
-    assert models.by_name["dh"].base is None
+    assert models["dh"].base is None

@@ -89,10 +89,10 @@ def extend(world: Arrays, i: int, wanted: int) -> None:
 
 
 @compiled
-def extend_all(world: Arrays, wanted: int) -> None:
-    """Compute the readings of every row up to number ``wanted``, from 0."""
+def extend_all(world: Arrays) -> None:
+    """Compute the first reading of every row."""
     for i in range(world[0].shape[0]):
-        extend(world, i, wanted)
+        extend(world, i, 0)
 
 
 @compiled

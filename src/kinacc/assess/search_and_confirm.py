@@ -87,12 +87,11 @@ class SearchAndConfirm(AdaptiveAssessor):
 
     def __post_init__(self) -> None:
         known, freedom = self.noise == KNOWN, self.noise_freedom
-        tested = f"0 without a test before, or at least {FEWEST}; {ENOUGH} are asked for"
+        tested = f"0, or with noise: estimated at least {FEWEST}; {ENOUGH} are asked for"
         guarded = "0 where the campaign estimates the noise, by readings that may be wrong"
         least = self.references + 2 * poses_of(self.references)
         conditions = (
-            ("noise_freedom", not (known and freedom), f"0 where noise is {KNOWN}"),
-            ("noise_freedom", known or freedom == 0 or freedom >= FEWEST, tested),
+            ("noise_freedom", freedom == 0 or (not known and freedom >= FEWEST), tested),
             ("arm_mm", self.arm_mm is None or self.error_of == VISIT, "null: only of visits"),
             ("wrong_rate", known or freedom > 0 or not self.wrong_rate, guarded),
             ("references", least <= self.measurements, f"fewer: they take {least} readings"),

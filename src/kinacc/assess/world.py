@@ -100,7 +100,7 @@ def drawn_world(
     readings, sizes = np.empty((points, visits, 3)), np.empty((points, visits))
     known, sums = np.zeros(points, np.int64), np.zeros((points, 3))
     world = World(readings, known, sigma, error[index], key, index, sums, sizes)
-    extend_all(tuple(world), 0)
+    extend_all(tuple(world))
     return world
 
 

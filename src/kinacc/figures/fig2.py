@@ -28,7 +28,7 @@ def run(inputs: Tables, settings: Settings) -> Figure:
     """
     robot, evaluation = robots.load(settings["robot"]), settings["evaluation"]
     model = dh.DHModel.from_columns(inputs["dh_model"], robot.dh)
-    tool = equipped(inputs, evaluation, robot).by_name[PLAINEST].tool
+    tool = equipped(inputs, evaluation, robot)[PLAINEST].tool
     reported = reported_joints(inputs["assessment_points"], model.joints)
     return draw(
         model,

@@ -67,8 +67,6 @@ def draw_noise(
     looks = style.assessor_style(table["assessor"])
     levels = np.unique(table["noise_um"])
     step = float(np.diff(levels).min()) if levels.size > 1 else 50.0
-    few, many = table["repetitions"].min(), table["repetitions"].max()
-    span = f"{many:.0f}" if few == many else f"{few:.0f} to {many:.0f}"
     with style.new_figure(style.SINGLE_COLUMN_IN, 3.1, dataset) as figure:
         ax = figure.subplots()
         for index, (name, (label, colour, marker)) in enumerate(looks.items()):
@@ -83,7 +81,8 @@ def draw_noise(
         ax.set(xlabel="Noise, standard deviation per axis (µm)", ylabel="Assessed accuracy (mm)")
         ax.set_xticks(levels[:: max(-(-levels.size // 8), 1)])
         ax.grid(axis="x", visible=False)
-        ax.set_title(f"Mean, smallest and largest of {span} simulations", color=style.MUTED)
+        title = f"Mean, smallest and largest of {table['repetitions'].max():.0f} simulations"
+        ax.set_title(title, color=style.MUTED)
         figure.legend(loc="outside lower center", ncols=2, title=taken_as_true)
     return figure
 

@@ -27,36 +27,30 @@ _CELLS_PER_BLOCK = 256
 class Equipped(NamedTuple):
     """A model with the tool centre point it carries in its last frame.
 
-    ``base``: its first frame in that of the robot, None where they are the same.
+    ``base``: its first frame in that of the robot, None where they are the same. ``travel`` (k,) is
+    the travel direction of every joint, or None for unknown.
     """
 
     model: ErrorModel
     tool: Pose = IDENTITY
     base: Pose | None = None
-
-    def tool_poses(self, q_rad: np.ndarray, travel: np.ndarray | None) -> Pose:
-        """Tool poses (n, ...) at joints (n, k), which travel in the directions (k,)."""
-        state = JointState(q_rad, None if travel is None else np.broadcast_to(travel, q_rad.shape))
-        end = compose(self.model.pose(state), self.tool)
-        return end if self.base is None else compose(self.base, end)
-
-
-class Models(NamedTuple):
-    """Models of one arm: of which one stands for the true arm, and which one is assessed.
-
-    ``travel`` (k,) is the travel direction of every joint, or None for unknown.
-    """
-
-    by_name: Mapping[str, Equipped]
     travel: np.ndarray | None = None
-    reference: str = "vec"
-    assessed: str = "dh"
+
+    def tool_poses(self, q_rad: np.ndarray) -> Pose:
+        """Tool poses (n, ...) at joints (n, k)."""
+        travel = None if self.travel is None else np.broadcast_to(self.travel, q_rad.shape)
+        end = compose(self.model.pose(JointState(q_rad, travel)), self.tool)
+        return end if self.base is None else compose(self.base, end)
 
     @property
     def range_rad(self) -> tuple[np.ndarray, np.ndarray]:
-        """DH joints (k,), (k,) that the reference says something of."""
-        true = self.by_name[self.reference].model
-        return true.domain or (np.full(true.joints, -np.inf), np.full(true.joints, np.inf))
+        """DH joints (k,), (k,) that the model says something of."""
+        model = self.model
+        return model.domain or (np.full(model.joints, -np.inf), np.full(model.joints, np.inf))
+
+
+Models = Mapping[str, Equipped]  # of one arm, by name
+TRUE, ASSESSED = "vec", "dh"  # the model that stands for the true arm, and the one assessed
 
 
 class PosesWanted(NamedTuple):
@@ -78,8 +72,7 @@ def errors_at(models: Models, q_rad: np.ndarray) -> np.ndarray:
     Both in the base of the assessed model; the rotation vector turns its orientation into that of
     the reference.
     """
-    names = models.reference, models.assessed
-    true, modelled = (models.by_name[name].tool_poses(q_rad, models.travel) for name in names)
+    true, modelled = (models[name].tool_poses(q_rad) for name in (TRUE, ASSESSED))
     return pose_error(true, modelled)
 
 
@@ -89,14 +82,16 @@ def joints_of(robot: Robot, models: Models, tool: Pose, invert_with: str) -> inv
     Tool poses are in the arm's base frame, branches those of ``inverse.machining_branches``. A
     solution outside the joint range of the reference is Status.OUTSIDE_RANGE.
     """
-    chosen = models.by_name[invert_with]
+    chosen = models[invert_with]
     flange = compose(tool, invert(chosen.tool))
     if robot.base is not IDENTITY:
         flange = compose(invert(robot.base), flange)
     if chosen.base is not None:
         flange = compose(invert(chosen.base), flange)
     branches = inverse.machining_branches(robot)
-    return inverse.solve(robot, chosen.model, flange, branches, models.travel, models.range_rad)
+    return inverse.solve(
+        robot, chosen.model, flange, branches, chosen.travel, models[TRUE].range_rad
+    )
 
 
 def accuracy_map(robot: Robot, models: Models, cells: Cells, wanted: PosesWanted) -> pd.DataFrame:

@@ -46,15 +46,16 @@ def equipped(inputs: Tables, evaluation: Settings, arm: Robot) -> Models:
     direction, carried = evaluation["travel_direction"], robot.carried(arm)
     offset = compose(carried, Pose(np.eye(3), np.array(evaluation["tool_mm"], dtype=float)))
     frames = inputs.get("frames")
-    by_name = {}
+    travel = np.full(arm.dh.joints, direction) if direction else None
+    equipped_models = {}
     for name, model in tables.models(inputs, arm.dh).items():
         tool, base = tables.fitted_tool(frames, model.kind, carried), None
         if model.table is None and frames is not None:  # its base in that of the DH model
             fitted, plain = (tables.frame(frames, kind, "base") for kind in (name, PLAINEST))
             if not all(np.array_equal(a, b) for a, b in zip(fitted, plain, strict=True)):
                 base = compose(invert(plain), fitted)
-        by_name[name] = Equipped(model, offset if tool is None else tool, base)
-    return Models(by_name, np.full(arm.dh.joints, direction) if direction else None)
+        equipped_models[name] = Equipped(model, offset if tool is None else tool, base, travel)
+    return equipped_models
 
 
 def mapped(inputs: Tables, settings: Settings) -> Tables:
@@ -83,10 +84,10 @@ def points(inputs: Tables, settings: Settings) -> Tables:
     else:
         wanted, wrist = poses_wanted(section), section["wrist"]
         q_rad = operating_points.in_space(arm, models, wanted, *drawn, wrist)
-    travel = np.zeros(q_rad.shape[1]) if models.travel is None else models.travel
+    travel = np.full(q_rad.shape, section["travel_direction"], np.int8)
     columns: Columns = {"point": np.arange(len(q_rad))}
     columns |= _numbered("q", limits.reported_joints(arm, q_rad))
-    columns |= _numbered("s", np.broadcast_to(travel.astype(np.int8), q_rad.shape))
+    columns |= _numbered("s", travel)
     return {"assessment_points": columns | _error_columns(errors_at(models, q_rad)[:, :3])}
 
 

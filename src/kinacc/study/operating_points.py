@@ -14,7 +14,7 @@ from kinacc.kinematics import inverse, region
 from kinacc.kinematics.inverse import Status, limits
 from kinacc.kinematics.region import Cylinder
 from kinacc.kinematics.robot import Robot
-from kinacc.study.accuracy_map import Models, PosesWanted, joints_of
+from kinacc.study.accuracy_map import ASSESSED, TRUE, Models, PosesWanted, joints_of
 from kinacc.tables.columns import Columns
 
 _DRAWS_PER_POINT = 500  # draws spent per wanted point before the space is called out of reach
@@ -82,13 +82,13 @@ def in_joints(
     Only configurations within the range of the reference are kept whose tool (assessed model) lies
     in the cylinder. Raises InputError where too few qualify.
     """
-    limited = robot.q_min_rad, robot.q_max_rad
-    lower, upper = limits.cut_to_range(robot, *limited, models.range_rad)
+    limited, known_rad = (robot.q_min_rad, robot.q_max_rad), models[TRUE].range_rad
+    lower, upper = limits.cut_to_range(robot, *limited, known_rad)
 
     def solve(unit: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         q_rad = robot.dh_joints(lower + unit * (upper - lower))
-        tool = models.by_name[models.assessed].tool_poses(q_rad, models.travel)
-        good = limits.within(q_rad, *models.range_rad)
+        tool = models[ASSESSED].tool_poses(q_rad)
+        good = limits.within(q_rad, *known_rad)
         good &= region.contains(cylinder, compose(robot.base, tool).position_mm)
         return q_rad, np.where(good, Status.FOUND, Status.OUTSIDE_RANGE)
 
