@@ -25,6 +25,7 @@ left alone. It costs ``rate`` of the confidence, and the statement says so.
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 from typing import TYPE_CHECKING, NamedTuple
@@ -325,9 +326,9 @@ class Looks:
     """Limits of all points of a ledger, mm; upper ones are kept as points are looked at.
 
     ``upper`` says at which counts points are looked at and how wide the upper limits are;
-    ``lower_error`` is what the lower limits of one point may miss by, ``shares`` (L,) its parts by
-    look. ``factor`` is how much larger than planned the noise is taken where points are chosen.
-    With a ``rate`` of wrong readings upper limits count clipped scores, and ``wrong`` is how many
+    ``lower_errors`` (L,) is what the lower limits of one point may miss by, look by look.
+    ``factor`` is how much larger than planned the noise is taken where points are chosen. With a
+    ``rate`` of wrong readings upper limits count clipped scores, and ``wrong`` is how many
     readings of the campaign are wrong at most. upper_mm: (m,), infinite before the first look.
     """
 
@@ -335,15 +336,14 @@ class Looks:
         self,
         ledger: Ledger,
         upper: Boundary,
-        lower_error: float,
-        shares: np.ndarray,
+        lower_errors: Sequence[float],
         factor: float,
         rate: float = 0.0,
         wrong: int = 0,
     ) -> None:
         points = ledger.candidates.points
         self.ledger, self.boundary, self.factor = ledger, upper, factor
-        self.lower_errors, self.rate, self.wrong = (lower_error * shares).tolist(), rate, wrong
+        self.lower_errors, self.rate, self.wrong = lower_errors, rate, wrong
         self.upper_mm = np.full(points, math.inf)
         self._counts = [*upper.counts.tolist(), math.inf]
         self._seen: list[list[_Look]] = [[] for _ in range(points)]

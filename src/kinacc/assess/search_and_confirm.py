@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
-from typing import Annotated, Any, ClassVar, Literal
+from typing import Annotated, ClassVar, Literal
 
 import numpy as np
 from numpy.typing import ArrayLike
 from pydantic import Field, NonNegativeFloat, NonNegativeInt, PositiveInt
 from pydantic.dataclasses import dataclass
-from scipy.special import bdtrc
+from scipy.stats import binom
 
 from kinacc.assess.adaptive import STRICT, AdaptiveAssessor, Campaign, Candidates, Confidence
 from kinacc.assess.limits import EARLY, SHARE, Boundary, Looks, LowerAverage, boundary, look_counts
@@ -170,19 +170,17 @@ class SearchAndConfirmCampaign(Campaign):
         self.single_error = allowed - lower_error
         single = self.single_error * (1.0 if math.isinf(self.noise.freedom) else 0.5)
         point_error, wrong = single / self.first, 0
-        shares = np.diff(np.array(self.counts) / self.counts[-1], prepend=0.0)
-        if len(shares) > 1:  # half for the first look
-            shares = np.append(0.5, 0.5 * shares[1:] / shares[1:].sum())
+        # Half for the first look, the rest by the readings added from look to look.
+        added = np.diff(self.counts)
+        shares = np.append(0.5, 0.5 * added / added.sum()) if len(added) else np.ones(1)
         if rate:
             # Half of the error of single points is for more wrong readings than are counted on.
             point_error *= 0.5
-            numbers = np.arange(settings.measurements + 1)
-            exceeded = bdtrc(numbers, settings.measurements, rate)
-            wrong = int(np.argmax(exceeded <= 0.5 * self.single_error))
+            wrong = int(binom.isf(0.5 * self.single_error, settings.measurements, rate))
         self.average = LowerAverage(wanted, lower_error, self.noise.freedom, rate)
         upper = self.boundary_of(allowed)
-        margin = self.noise.margin
-        self.looks = Looks(self.ledger, upper, point_error, shares, margin, rate, wrong)
+        margin, lower_errors = self.noise.margin, (point_error * shares).tolist()
+        self.looks = Looks(self.ledger, upper, lower_errors, margin, rate, wrong)
         # The block under way: its row, readings it still takes, whether these count for the lower
         # bound and along which direction; its number, and whether the next reading begins it.
         self._row, self._left, self._counted = -1, 0, False
@@ -272,28 +270,31 @@ class SearchAndConfirmCampaign(Campaign):
             return Statement(MEASURED, withheld=early), Statement(CANDIDATES, withheld=early)
         sizes, noise_mm = ledger.sizes_mm(), ledger.noise_mm[ledger.visited]
         value_mm, value_of_all_mm = likely_largest_mm(sizes, noise_mm, points - visited)
-        measured = Statement(MEASURED, value_mm, error_of=settings.error_of)
-        everywhere = replace(measured, target=CANDIDATES, value_mm=value_of_all_mm)
+        stated = [
+            Statement(MEASURED, value_mm, error_of=settings.error_of),
+            Statement(CANDIDATES, value_of_all_mm, error_of=settings.error_of),
+        ]
         if missing := self.noise.missing():
-            return replace(measured, withheld=missing), replace(everywhere, withheld=missing)
+            return tuple(replace(item, withheld=missing) for item in stated)
         noise = self.noise.taken(self.allowed)
         # Wrong readings withhold no bound where they are guarded against.
         guarded = "wrong_readings" if settings.wrong_rate else ""
         against = next((alarm for alarm in self.alarms() if alarm.code != guarded), None)
-        bounds: dict[str, Any] = {"withheld": against, "noise": noise.reason}
-        excluded = {}
+        stated = [replace(item, withheld=against, noise=noise.reason) for item in stated]
         if against is None:
-            bounds["lower_mm"] = self._lower_mm()
-            bounds["upper_mm"] = self._upper_mm(self.allowed, value_mm)
-            bounds["confidence"] = settings.confidence - settings.wrong_rate
+            lower_mm, upper_mm = self._lower_mm(), self._upper_mm(self.allowed, value_mm)
+            sure = settings.confidence - settings.wrong_rate
+            stated = [
+                replace(item, lower_mm=lower_mm, upper_mm=upper_mm, confidence=sure)
+                for item in stated
+            ]
             if visited < points:
                 number = excepted(points, visited, MISSED * self.allowed)
-                least_mm = 0.0 if number else everywhere.value_mm
+                least_mm = 0.0 if number else value_of_all_mm
                 upper_mm = self._upper_mm((1.0 - MISSED) * self.allowed, least_mm)
-                excluded = {"upper_mm": upper_mm, "excepted": number}
-        stated = replace(measured, **bounds), replace(everywhere, **{**bounds, **excluded})
+                stated[1] = replace(stated[1], upper_mm=upper_mm, excepted=number)
         if settings.error_of == MEAN:
-            return stated
+            return tuple(stated)
         arms_mm = self.noise.arms_mm(noise)
         return tuple(item.of_future_visits(arms_mm) for item in stated)
 
