@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from textwrap import fill
 from typing import Any
 
 import numpy as np
@@ -44,11 +43,10 @@ def draw(accuracy_map: Columns, *, dataset: str | None = None) -> Figure:
     cells["dotted"] = partly & ~partly.all()
     slices, radii, heights = (np.unique(cells[name]) for name in PLACE)
     edges = _edges(radii), _edges(heights)
-    wide = slices.size > 2
-    width = style.DOUBLE_COLUMN_IN if wide else style.SINGLE_COLUMN_IN
+    width = style.DOUBLE_COLUMN_IN
     panel_w = max((width - MARGINS_IN[0]) / slices.size, 0.5)
     panel_h = min(panel_w * float(np.ptp(edges[1]) / np.ptp(edges[0])), 3.2)
-    with style.new_figure(width, 2 * panel_h + MARGINS_IN[1] + 0.31 * (not wide)) as figure:
+    with style.new_figure(width, 2 * panel_h + MARGINS_IN[1]) as figure:
         panels = figure.subplots(2, slices.size, sharex=True, sharey=True, squeeze=False)
         for row, (column, label, unit) in enumerate(ROWS):
             low, high = colour_range(cells[column].to_numpy())
@@ -70,8 +68,7 @@ def draw(accuracy_map: Columns, *, dataset: str | None = None) -> Figure:
         panels[1, (slices.size - 1) // 2].set_xlabel("Radius (mm)")
         figure.supylabel("Height (mm)")
         name = style.shortened(dataset or "", int(15 * width))
-        head = HEAD if wide else fill(HEAD, 40)
-        figure.suptitle(f"{name}\n{head}" if name else head, parse_math=False)
+        figure.suptitle(f"{name}\n{HEAD}".strip(), parse_math=False)
         rings = [line for ax in panels.flat for line in ax.lines if line.get_label() == RING]
         marks: dict[str, Artist] = {RING: rings[-1]} if rings else {}
         if partly.all():
@@ -80,7 +77,7 @@ def draw(accuracy_map: Columns, *, dataset: str | None = None) -> Figure:
             marks[PARTLY] = Patch(fc="#21918c", ec="white", hatch="...", lw=0)
         if (cells["solutions"] > 0).sum() < slices.size * radii.size * heights.size:
             marks["not reachable"] = Patch(**_HATCHED)
-        figure.legend(marks.values(), marks, loc="outside lower center", ncols=3 if wide else 2)
+        figure.legend(marks.values(), marks, loc="outside lower center", ncols=3)
     return figure
 
 
