@@ -37,8 +37,8 @@ def geometry_columns() -> list[str]:
 def rows() -> list[dict[str, float]]:
     """Rows of the table of accepted draws, in order of their seeds; lines with # are remarks."""
     with (resources.files("kinacc") / "synthetic" / FILE).open(encoding="utf-8") as file:
-        table = pd.read_csv(file, comment="#", float_precision="round_trip")
-    return table.to_dict("records")
+        table = pd.read_csv(file, comment="#", dtype=str)
+    return table.astype(float).to_dict("records")
 
 
 def accepted_draw(number: int) -> AcceptedDraw:
