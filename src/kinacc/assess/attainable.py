@@ -14,7 +14,7 @@ from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
-from scipy.optimize import brentq
+from scipy.optimize import brentq, fminbound
 from scipy.special import chndtrix, ndtr, ndtri, rel_entr
 
 from kinacc.assess.limits import reading_below
@@ -25,7 +25,6 @@ _BEYOND = 6.0  # standard deviations behind which nothing is left of an integran
 _TABLE_TO = 30.0  # standard deviations of size up to which quantiles of lengths are tabulated
 # Of noise over distance from a level: 2 evens quantiles out, 2/3 ties of unequal noise.
 _POWER = 1.5
-_LEVELS, _ROUNDS = 7, 3  # levels tried when the best counts are sought, ever closer to the best
 
 
 class WidthLimits(NamedTuple):
@@ -83,15 +82,16 @@ def best_counts(
     level; what single readings moved by trial still gain is 2 %.
     """
     below = np.max(sizes_mm) - sizes_mm
+
+    def counts(log_level: float) -> np.ndarray:
+        return _filled((noise_mm / (math.exp(log_level) + below)) ** _POWER, readings)
+
+    def excess(log_level: float) -> float:
+        return mean_excess_mm(sizes_mm, noise_mm, counts(log_level), error)
+
     # A level hardly above the largest size gives it all; one far above all shares equally.
     first, last = 0.1 * noise_mm.min() / math.sqrt(readings), noise_mm.max() * 10.0 + below.max()
-    for _ in range(_ROUNDS):
-        levels = np.geomspace(first, last, _LEVELS)
-        tried = [_filled((noise_mm / (level + below)) ** _POWER, readings) for level in levels]
-        excess = [mean_excess_mm(sizes_mm, noise_mm, counts, error) for counts in tried]
-        best = int(np.argmin(excess))
-        first, last = levels[max(best - 1, 0)], levels[min(best + 1, _LEVELS - 1)]
-    return tried[best]
+    return counts(float(fminbound(excess, math.log(first), math.log(last), xtol=0.03)))
 
 
 def mean_excess_mm(
