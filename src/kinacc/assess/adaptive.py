@@ -148,14 +148,15 @@ class Ledger:
         uneven = np.abs(spread - noise**2 * np.eye(3)).max() > _SYMMETRY * noise**2
         return spread if uneven else noise
 
-    def covariances(self, places: Iterable[int]) -> np.ndarray:
-        """Covariances (n, 3, 3) of the readings at these places (0 = first)."""
-        return np.array([self.readings[place][2] for place in places]).reshape(-1, 3, 3)
+    def places(self, point: int) -> np.ndarray:
+        """Places (n,) of a point's readings among all (0 = first)."""
+        return np.flatnonzero([row == point for row, _, _ in self.readings])
 
-    def readings_of(self, point: int, number: int) -> tuple[np.ndarray, np.ndarray]:
-        """The first readings of a point (number, 3) and their covariances (number, 3, 3)."""
-        places = [place for place, (row, _, _) in enumerate(self.readings) if row == point][:number]
-        return np.array([self.readings[place][1] for place in places]), self.covariances(places)
+    def at(self, places: Iterable[int]) -> tuple[np.ndarray, np.ndarray]:
+        """The readings (n, 3) at these places and their covariances (n, 3, 3)."""
+        read = [self.readings[place] for place in places]
+        vectors = np.array([reading for _, reading, _ in read])
+        return vectors.reshape(-1, 3), np.array([spread for *_, spread in read]).reshape(-1, 3, 3)
 
     def sizes_mm(self) -> np.ndarray:
         """Sizes of the mean readings of the visited points, in visiting order."""

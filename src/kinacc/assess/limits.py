@@ -398,7 +398,8 @@ class Looks:
         mean, noise, as_planned = self._seen[point][look]
         z = (boundary.z if as_planned else boundary.alone).item(look)
         if look and self.rate:
-            readings, covariances = self.ledger.readings_of(point, int(boundary.counts[look]))
+            count = boundary.counts.item(look)
+            readings, covariances = self.ledger.at(self.ledger.places(point)[:count])
             return guarded_upper_mm(readings, factor**2 * covariances, z, self.rate)
         if not isinstance(noise, float):
             return largest_size(mean, noise, factor * z)

@@ -45,13 +45,13 @@ _STEP = 0.7  # of the standard deviation of a logarithm of scale: nodes of the i
 class Contrasts(NamedTuple):
     """Differences within blocks, in the order taken: standard normal where the noise is as stated.
 
-    rows: (n,) candidate of each; places: (n,) of its reading in the ledger, from 0; values: (n, 3),
-    each the difference of a reading from the mean of those before it in its block, in units of its
-    own standard deviations.
+    rows: (n,) candidate of each; blocks: (n,) number of its block; values: (n, 3), each the
+    difference of a reading from the mean of those before it in its block, in units of its own
+    standard deviations.
     """
 
     rows: np.ndarray
-    places: np.ndarray
+    blocks: np.ndarray
     values: np.ndarray
 
     @property
@@ -64,14 +64,13 @@ class Contrasts(NamedTuple):
         """Squared lengths (n,)."""
         return np.sum(self.values**2, axis=1)
 
-    def without_wrong_blocks(self, blocks: Sequence[int]) -> Contrasts:
-        """Differences of blocks without a reading far off, ``blocks`` being those of all readings.
+    def without_wrong_blocks(self) -> Contrasts:
+        """Differences of blocks without a reading far off.
 
         Readings that go wrong and are guarded against tell nothing of the noise of others; one is
         in many differences of its block.
         """
-        block = np.asarray(blocks)[self.places]
-        near = ~np.isin(block, block[self.squares > _FAR])
+        near = ~np.isin(self.blocks, self.blocks[self.squares > _FAR])
         return Contrasts(*(column[near] for column in self))
 
 
@@ -81,9 +80,8 @@ def contrasts(ledger: Ledger, blocks: Sequence[int]) -> Contrasts:
     blocks: of each reading the number of its block; readings of a block are of one point.
     """
     under_way: dict[int, tuple[np.ndarray, np.ndarray]] = {}  # mean, and inverse of its covariance
-    rows, places, values = [], [], []
-    read = zip(blocks, ledger.readings, strict=True)
-    for place, (block, (row, reading, spread)) in enumerate(read):
+    rows, numbers, values = [], [], []
+    for block, (row, reading, spread) in zip(blocks, ledger.readings, strict=True):
         added = np.linalg.inv(spread)
         if block not in under_way:
             under_way[block] = reading, added
@@ -92,11 +90,11 @@ def contrasts(ledger: Ledger, blocks: Sequence[int]) -> Contrasts:
         apart = reading - mean
         values.append(np.linalg.solve(np.linalg.cholesky(spread + np.linalg.inv(weight)), apart))
         rows.append(row)
-        places.append(place)
+        numbers.append(block)
         weight = weight + added
         under_way[block] = mean + np.linalg.solve(weight, added @ apart), weight
     differences = np.array(values).reshape(-1, 3)
-    return Contrasts(np.array(rows, np.int64), np.array(places, np.int64), differences)
+    return Contrasts(np.array(rows, np.int64), np.array(numbers, np.int64), differences)
 
 
 def largest_factor(
@@ -183,7 +181,7 @@ class CampaignNoise:
     def telling(self) -> Contrasts:
         """Those that tell of the noise: of blocks without a wrong reading, where some may be."""
         found = self.contrasts
-        return found.without_wrong_blocks(self._blocks) if self._guarded else found
+        return found.without_wrong_blocks() if self._guarded else found
 
     def missing(self) -> Reason | None:
         """Why the noise is not known yet; None where it is."""
@@ -203,7 +201,7 @@ class CampaignNoise:
             least, most = 1.0, value
         elif self.is_bounded:
             rows = np.array(self.ledger.visited[: self.first])
-            first = np.array([self.ledger.readings_of(row, 1)[0][0] for row in rows])
+            first = self.ledger.at([self.ledger.places(row)[0] for row in rows])[0]
             value = largest_factor(self.ledger.candidates, rows, first, part)
             least, most, reason = 0.0, value, Reason("noise_bounded", {"factor": value})
         else:
@@ -363,8 +361,8 @@ def suspicious_readings(
     of_first = factor * _limit(0.5 * FALSE_ALARM / ledger.candidates.points, freedom)
     suspicious = []
     for row in np.flatnonzero(ledger.count > 1).tolist():
-        places = np.array([at for at, reading in enumerate(ledger.readings) if reading[0] == row])
-        readings = ledger.readings_of(row, len(places))
+        places = ledger.places(row)
+        readings = ledger.at(places)
         looks = np.searchsorted(counts, np.arange(len(places)), side="right")
         block = np.where(np.array(blocks)[places] < 0, -places - 1, looks)
         named: dict[int, float] = {}

@@ -97,8 +97,7 @@ def planned_readings(plan: Schedule, ledger: Ledger) -> Readings:
     """Of the readings of a ledger, those planned of reference poses."""
     place = [index for index in plan.row_at if index < ledger.taken]
     rows = np.array([plan.row_at[index] for index in place], dtype=np.intp)
-    vectors = np.array([ledger.readings[index][1] for index in place]).reshape(-1, 3)
-    return Readings(np.array(place), rows, vectors, ledger.covariances(place))
+    return Readings(np.array(place), rows, *ledger.at(place))
 
 
 @dataclass(frozen=True)

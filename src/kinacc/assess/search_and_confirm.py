@@ -222,9 +222,9 @@ class SearchAndConfirmCampaign(Campaign):
         if in_block:
             self._left -= 1
             if self._counted and not is_planned:
-                along, spread = self._direction, ledger.covariances([place])[0]
+                along, (_, reading, spread) = self._direction, ledger.readings[place]
                 noise_mm = math.sqrt(float(along @ spread @ along))
-                self.average.record(point, float(along @ ledger.readings[-1][1]), noise_mm)
+                self.average.record(point, float(along @ reading), noise_mm)
                 # A bound stated inside a block is of a mean of its own: a new block begins.
                 self._begins = self.average.at_stage
         self.looks.update(point)
