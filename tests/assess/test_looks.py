@@ -53,7 +53,11 @@ def lower_bounds(wanted, campaigns, rng, factor=1.0):
     """
     found = np.empty(campaigns)
     for campaign in range(campaigns):
-        average, sigma, noise = LowerAverage(wanted, ERROR), 1.0, rng.normal(size=wanted)
+        average, sigma, noise = (
+            LowerAverage(wanted, ERROR, math.inf, 0.0),
+            1.0,
+            rng.normal(size=wanted),
+        )
         for number in range(wanted):
             along = 1.0 + sigma * noise.item(number)
             average.record(number % 7, along, sigma)

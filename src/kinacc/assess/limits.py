@@ -338,8 +338,8 @@ class Looks:
         upper: Boundary,
         lower_errors: Sequence[float],
         factor: float,
-        rate: float = 0.0,
-        wrong: int = 0,
+        rate: float,
+        wrong: int,
     ) -> None:
         points = ledger.candidates.points
         self.ledger, self.boundary, self.factor = ledger, upper, factor
@@ -413,9 +413,7 @@ class LowerAverage:
     standard deviation of that (mm). ``rate``: share of readings that may be wrong.
     """
 
-    def __init__(
-        self, wanted: int, error: float, freedom: float = math.inf, rate: float = 0.0
-    ) -> None:
+    def __init__(self, wanted: int, error: float, freedom: float, rate: float) -> None:
         self.wanted, self._rate = wanted, rate
         self._stages: dict[int, float] = {}  # readings that count, and deviations taken off
         if wanted:

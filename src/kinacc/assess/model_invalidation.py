@@ -119,12 +119,6 @@ class ModelInvalidation(Assessor):
         """The scan of :func:`kinacc.assess.invalidation_kernels.scan` with these settings."""
         from kinacc.assess.invalidation_kernels import scan
 
-        self._check_visits(world)
-        roots = np.arange(self.measurements + 1.0) ** _POWERS[self.covariance]
-        squared = self.distance == "squared"
-        return scan(tuple(world), bounds_mm, wanted, float(self.alpha), squared, roots)
-
-    def _check_visits(self, world: World) -> None:
         if world.visits < self.measurements:
             raise input_error(
                 "repeats",
@@ -132,3 +126,6 @@ class ModelInvalidation(Assessor):
                 f"{self.measurements} readings a point, for all may fall on one",
                 "give more repeats or a smaller budget",
             )
+        roots = np.arange(self.measurements + 1.0) ** _POWERS[self.covariance]
+        squared = self.distance == "squared"
+        return scan(tuple(world), bounds_mm, wanted, float(self.alpha), squared, roots)

@@ -282,7 +282,12 @@ class SearchAndConfirmCampaign(Campaign):
         against = next((alarm for alarm in self.alarms() if alarm.code != guarded), None)
         stated = [replace(item, withheld=against, noise=noise.reason) for item in stated]
         if against is None:
-            lower_mm, upper_mm = self._lower_mm(), self._upper_mm(self.allowed, value_mm)
+            if self.average.has_spoken:
+                lower_mm = self.average.bound_mm(noise.by_point)
+            else:
+                lower_mm = self.looks.largest_lower_mm(self._single_factor())
+            lower_mm = max(lower_mm - settings.allowance_mm, 0.0)
+            upper_mm = self._upper_mm(self.allowed, value_mm)
             sure = settings.confidence - settings.wrong_rate
             stated = [
                 replace(item, lower_mm=lower_mm, upper_mm=upper_mm, confidence=sure)
@@ -350,13 +355,6 @@ class SearchAndConfirmCampaign(Campaign):
         # Where unlucky readings put the bound below the likely size, that is the better bound.
         largest = max(float(self._limits_mm(error)[self.ledger.visited].max()), value_mm)
         return largest + self.settings.allowance_mm
-
-    def _lower_mm(self) -> float:
-        if self.average.has_spoken:
-            bound_mm = self.average.bound_mm(self.noise.taken(self.allowed).by_point)
-        else:
-            bound_mm = self.looks.largest_lower_mm(self._single_factor())
-        return max(bound_mm - self.settings.allowance_mm, 0.0)
 
 
 def excepted(points: int, drawn: int, error: float) -> int:

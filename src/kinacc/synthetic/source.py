@@ -13,7 +13,7 @@ from kinacc.kinematics import region, robot
 from kinacc.measurements.folds import split
 from kinacc.measurements.reader import read
 from kinacc.synthetic import measure
-from kinacc.tables.columns import Columns, Tables
+from kinacc.tables.columns import Tables
 from kinacc.tables.contract import columns_of
 
 
@@ -27,15 +27,11 @@ def run(inputs: Mapping[str, Any], settings: Settings) -> Tables:
         for message in reading.left_out():
             warnings.warn(message, stacklevel=1)
         columns = reading.columns
-    return {"measurements": split(columns, settings), "robot": _robot(arm)}
+    row = (arm.name, arm.source or None, arm.date or None, robot.as_yaml(arm))
+    return {"measurements": split(columns, settings), "robot": columns_of("robot", [row])}
 
 
 def attitude(evaluation: Settings) -> region.Attitude:
     """The flange's attitude in the ``evaluation`` settings, which a calibration has to cover."""
     euler_rad = np.deg2rad(evaluation["reference_orientation_deg"])
     return region.Attitude(region.reference_rotation(euler_rad), evaluation["reference_frame"])
-
-
-def _robot(arm: robot.Robot) -> Columns:
-    row = (arm.name, arm.source or None, arm.date or None, robot.as_yaml(arm))
-    return columns_of("robot", [row])
