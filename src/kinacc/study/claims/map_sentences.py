@@ -19,22 +19,24 @@ _TOP_SHARE = 0.01  # the largest cells of a map
 _OUTER_DEG = (0.0, 60.0)
 _INNER_DEG = (15.0, 30.0, 45.0)
 _PLACE = ["slice_deg", "height_mm", "radius_mm"]
+_SHARES = ["height", "radius"]  # where a cell is in its slice, from 0 to 1
 _POSITION, _ORIENTATION = "position_max_mm", "orientation_max_mrad"
 
 
 def map_values(accuracy_map: Columns) -> dict[str, float]:
     """Values of the sentences about where the largest errors lie and where the maps break."""
     cells = pd.DataFrame(dict(accuracy_map)).sort_values(_PLACE, ignore_index=True)
-    cells["row"], cells["column"] = (cells[_PLACE[1:]].rank(method="dense") - 1.0).to_numpy().T
+    number = cells[_PLACE[1:]].rank(method="dense") - 1.0
+    cells[_SHARES] = number / number.max().clip(lower=1.0)
     flat, worst = {}, {}
     for quantity in (_POSITION, _ORIENTATION):
         slices = cells.dropna(subset=quantity).groupby("slice_deg")
         flat[quantity] = float(np.mean([_plane_share(own, quantity) for _, own in slices]))
         worst[quantity] = cells.loc[slices[quantity].idxmax()].set_index("slice_deg")
-    apart = {quantity: _distances(cells, places) for quantity, places in worst.items()}
+    apart = {quantity: _distances(places) for quantity, places in worst.items()}
     outer = worst[_POSITION][worst[_POSITION].index.isin(_OUTER_DEG)]
     inner = worst[_POSITION][worst[_POSITION].index.isin(_INNER_DEG)]
-    inside, outside = _distances(cells, inner), _distances(cells, outer)
+    inside, outside = _distances(inner), _distances(outer)
     less_predictable = math.nan
     if inside.size and outside.size:
         # Equal places at 0 and 60 deg are the most predictable there is: the ratio has no bound.
@@ -46,7 +48,7 @@ def map_values(accuracy_map: Columns) -> dict[str, float]:
     return {
         "map_nonlinear": max(flat.values()),
         "map_largest_changes_location": min(np.concatenate([*apart.values()]), default=math.nan),
-        "map_position_outer_reaches": float((outer["column"] / _last(cells, "column")).min()),
+        "map_position_outer_reaches": float(outer["radius"].min()),
         "map_position_less_predictable_inside": less_predictable,
         "map_orientation_less_predictable": of_orientation,
         "map_orientation_near_discontinuities": _near_discontinuities(cells, jumps),
@@ -59,19 +61,14 @@ def _plane_share(cells: pd.DataFrame, quantity: str) -> float:
     values = cells[quantity].to_numpy()
     if values.size < 4 or np.ptp(values) == 0.0:
         return math.nan
-    design = np.column_stack([np.ones_like(values), cells[["row", "column"]]])
+    design = np.column_stack([np.ones_like(values), cells[_SHARES]])
     fitted = design @ np.linalg.lstsq(design, values, rcond=None)[0]
     return 1.0 - float(np.var(values - fitted) / np.var(values))
 
 
-def _last(cells: pd.DataFrame, name: str) -> float:
-    return max(cells[name].max(), 1.0)
-
-
-def _distances(cells: pd.DataFrame, places: pd.DataFrame) -> np.ndarray:
+def _distances(places: pd.DataFrame) -> np.ndarray:
     """Distances between every two places, as fractions of a slice."""
-    shares = places[["row", "column"]] / [_last(cells, "row"), _last(cells, "column")]
-    return pdist(shares) if len(places) else np.empty(0)
+    return pdist(places[_SHARES]) if len(places) else np.empty(0)
 
 
 def _discontinuities(cells: pd.DataFrame) -> np.ndarray:
