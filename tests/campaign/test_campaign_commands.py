@@ -141,7 +141,7 @@ def test_a_reading_that_went_wrong_is_struck_but_stays_in_the_report(campaign):
     ("options", "place"),
     [
         (("--noise-mm", "0"), "noise"),
-        (("--noise-mm", "1,2,3,4,5,6,7,8,9"), "not symmetric"),
+        (("--noise-mm", "1,2,3,4,5,6,7,8,9"), "is no covariance"),
         (("--instrument", "a=0.1,0.2"), "1 standard deviation, 3"),
         (("--instrument", "a=0.1", "--instrument", "a=0.2"), "is given twice"),
         ((), "--noise-mm"),

@@ -40,7 +40,9 @@ class Candidates:
 
     def __init__(self, covariance_mm2: ArrayLike) -> None:
         self.covariance_mm2 = np.array(covariance_mm2, dtype=float)
-        problems = _check_covariances(self.covariance_mm2, "covariance of point")
+        none = np.flatnonzero(~are_covariances(self.covariance_mm2))
+        where = "covariance of point"
+        problems = [Problem(f"{where} {row}", "is no covariance", COVARIANCE) for row in none]
         refuse(problems, "these candidates cannot be assessed")
 
     @classmethod
@@ -121,7 +123,8 @@ class Ledger:
             problems.append(Problem("reading", f"{reading.tolist()}", "three numbers, in mm"))
         if covariance_mm2 is not None:
             covariance = np.array(covariance_mm2, dtype=float)
-            problems += _check_covariances(covariance[None], "covariance")
+            if not are_covariances(covariance[None]).all():
+                problems.append(Problem("covariance", "is none", COVARIANCE))
         refuse(problems, "this reading cannot be recorded")
         if not self.count[point]:
             self.visited.append(point)
@@ -239,21 +242,15 @@ class Campaign:
         return self.ledger.limits_mm(error / max(len(self.ledger.visited), 1), error)
 
 
-def covariance_faults(covariance_mm2: np.ndarray) -> list[tuple[int, str]]:
-    """Rows of covariances (n, 3, 3) that are none, each with what is wrong."""
-    if covariance_mm2.shape[1:] != (3, 3) or not len(covariance_mm2):
-        return [(0, f"shape {covariance_mm2.shape[1:]}, not (3, 3)")]
-    finite = np.isfinite(covariance_mm2).all(axis=(1, 2))
-    safe = np.where(finite[:, None, None], covariance_mm2, np.eye(3))
+COVARIANCE = "(3, 3), finite, symmetric and positive definite, in mm^2"
+
+
+def are_covariances(covariance_mm2: np.ndarray) -> np.ndarray:
+    """Which of n arrays are covariances (3, 3) of a reading."""
+    if covariance_mm2.shape[1:] != (3, 3):
+        return np.zeros(len(covariance_mm2), dtype=bool)
+    safe = np.nan_to_num(covariance_mm2)
     scale = np.abs(safe).max(axis=(1, 2))
     skewed = np.abs(safe - np.swapaxes(safe, 1, 2)).max(axis=(1, 2)) > _SYMMETRY * scale
-    flat = np.linalg.eigvalsh(safe)[:, 0] <= 1e-14 * scale
-    names = ["not finite", "not symmetric", "not positive definite"]
-    faults = np.select([~finite, skewed, flat], names, "")
-    return [(int(row), str(faults[row])) for row in np.flatnonzero(faults != "")]
-
-
-def _check_covariances(covariance_mm2: np.ndarray, name: str) -> list[Problem]:
-    allowed = "symmetric, positive definite, in mm^2"
-    faults = covariance_faults(covariance_mm2)
-    return [Problem(f"{name} {row}", fault, allowed) for row, fault in faults]
+    is_finite = np.isfinite(covariance_mm2).all(axis=(1, 2))
+    return is_finite & ~skewed & (np.linalg.eigvalsh(safe)[:, 0] > 1e-14 * scale)

@@ -20,7 +20,7 @@ from pydantic import (
     ValidationError,
 )
 
-from kinacc.assess.adaptive import covariance_faults
+from kinacc.assess.adaptive import COVARIANCE, are_covariances
 from kinacc.assess.noise import ENOUGH, FEWEST
 from kinacc.config import json_files
 from kinacc.config.names import not_in_a_line
@@ -221,8 +221,8 @@ def covariance_of(text: str, where: str) -> np.ndarray:
     values = numbers_of(text)
     if values.size == 9:
         covariance = values.reshape(3, 3)
-        allowed = "symmetric, positive definite, in mm^2"
-        refuse(Problem(where, fault, allowed) for _, fault in covariance_faults(covariance[None]))
+        if not are_covariances(covariance[None]).all():
+            raise input_error(where, "is no covariance", COVARIANCE)
         return covariance
     if values.size not in (1, 3):
         raise input_error(where, repr(text), _FORMS)
@@ -293,7 +293,9 @@ def read_repeatability(path: str | Path) -> tuple[np.ndarray, int, list[Problem]
     if test.noise is None:
         raise input_error(where, "has no noise: no pose was visited again", fix=fix)
     covariance, freedom = test.noise.covariance_mm2, int(test.noise.freedom)
-    problems = [Problem(where, fault, fix=fix) for _, fault in covariance_faults(covariance[None])]
+    problems = []
+    if not are_covariances(covariance[None]).all():
+        problems.append(Problem(where, "has no covariance", COVARIANCE, fix))
     if freedom < FEWEST:
         allowed = f"at least {FEWEST}; {ENOUGH} are wanted"
         problems.append(Problem(where, f"{freedom} degrees of freedom", allowed, fix))
