@@ -12,7 +12,6 @@ from kinacc.study.histories import (
     FALLBACK,
     KEPT,
     REJECTED,
-    HistorySettings,
     examples,
     histories,
 )
@@ -23,15 +22,11 @@ STUDY = of_section(Visits, paper.study())
 ASSESSOR = of_section(ModelInvalidation, paper.study())
 
 
-def settings(**changes) -> HistorySettings:
-    return of_section(HistorySettings, paper.histories(**changes))
-
-
 ERROR = np.random.default_rng(0).normal(size=(200, 3)) * 0.2
 
 
 def test_where_no_simulation_obeys_the_rule_the_nearest_is_shown_and_says_so():
-    far = settings(eta_ratio_rejected=3.0, eta_ratio_kept=0.05, simulations_searched=4)
+    far = paper.histories(eta_ratio_rejected=3.0, eta_ratio_kept=0.05, simulations_searched=4)
     table = histories(ERROR, far, STUDY, ASSESSOR, SEED)
     for example in (REJECTED, KEPT):
         rows = pd.DataFrame(table).query(f"example == '{example}'")
@@ -39,6 +34,6 @@ def test_where_no_simulation_obeys_the_rule_the_nearest_is_shown_and_says_so():
         assert {*rows["rule"]} == {FALLBACK}
         assert {*rows["simulation"]} == {0}
     # Rejected at eta, but at the larger bound too.
-    near = settings(eta_ratio_rejected=0.05, eta_ratio_larger=0.06, simulations_searched=4)
+    near = paper.histories(eta_ratio_rejected=0.05, eta_ratio_larger=0.06, simulations_searched=4)
     found = examples(ERROR, near, STUDY, ASSESSOR, SEED)[0]
     assert (found.simulation, found.rule, found.rule_met) == (0, FALLBACK, False)

@@ -14,7 +14,7 @@ from oracles import worlds
 from kinacc.assess.model_invalidation import ModelInvalidation
 from kinacc.config.records import of_section
 from kinacc.study import monte_carlo
-from kinacc.study.histories import HistorySettings, histories
+from kinacc.study.histories import histories
 
 NOISE = (0.01, 0.03)
 SMALL = paper.study(noise_mm=NOISE, repetitions=3, measurements=12)
@@ -193,7 +193,7 @@ def test_histories_are_the_first_runs_of_the_studys_worlds_that_satisfy_the_rule
     study = paper.study(measurements=60)
     table = histories(
         error,
-        of_section(HistorySettings, paper.histories(simulations_searched=200, **ratios)),
+        paper.histories(simulations_searched=200, **ratios),
         of_section(monte_carlo.Visits, study),
         of_section(ModelInvalidation, study),
         seed=3,

@@ -7,7 +7,6 @@ the rule of an example is shown.
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
@@ -35,22 +34,6 @@ RULES = {
 FALLBACK = "first simulation decided so, else the first: none searched obeys the rule"
 
 
-@dataclass(frozen=True)
-class HistorySettings:
-    """The ``histories`` section of the configuration.
-
-    noise_mm: standard deviation per axis; eta_ratio_*: bound over true accuracy of the run that
-    rejects, of the larger bound on its world, and of the run that does not reject;
-    simulations_searched: how many repetitions are looked through.
-    """
-
-    noise_mm: float
-    eta_ratio_rejected: float
-    eta_ratio_larger: float
-    eta_ratio_kept: float
-    simulations_searched: int
-
-
 class Example(NamedTuple):
     """One run to show: its name, simulation and bound, and the rule it was chosen by."""
 
@@ -63,7 +46,7 @@ class Example(NamedTuple):
 
 def histories(
     error_mm: ArrayLike,
-    settings: HistorySettings,
+    section: Settings,
     visits: Visits,
     assessor: ModelInvalidation,
     seed: int,
@@ -72,18 +55,18 @@ def histories(
     """Columns of ``histories``: each example measurement by measurement.
 
     error_mm: (m, 3) true errors at the operating points, robot base frame, mm; point: (m,) their
-    numbers, default 0 .. m-1. ``visits`` and ``assessor`` are the study's. Raises InputError for
-    errors that cannot be used.
+    numbers, default 0 .. m-1. ``section``: the configuration's ``histories``; ``visits`` and
+    ``assessor`` are the study's. Raises InputError for errors that cannot be used.
     """
     errors = checked_errors(error_mm)
     numbers = np.arange(len(errors)) if point is None else np.asarray(point, np.int64)
     sizes, tables = np.linalg.norm(errors, axis=1), []
     settled = {name: getattr(assessor, name) for name in ("alpha", "distance", "covariance")}
-    for example in examples(errors, settings, visits, assessor, seed):
-        world = world_of(errors, settings.noise_mm, example.simulation, visits, seed)
+    for example in examples(errors, section, visits, assessor, seed):
+        world = world_of(errors, section["noise_mm"], example.simulation, visits, seed)
         steps = assessor.history(world, example.eta_mm)
         rows = world.point[steps.pop("row")]
-        columns = {**example._asdict(), **settled, "noise_mm": settings.noise_mm}
+        columns = {**example._asdict(), **settled, "noise_mm": section["noise_mm"]}
         columns |= {"iteration": np.arange(len(steps)) + 1, "rule_met": int(example.rule_met)}
         tables.append(steps.assign(**columns, point=numbers[rows], true_mm=sizes[rows]))
     return columns_from("histories", pd.concat(tables))
@@ -91,7 +74,7 @@ def histories(
 
 def examples(
     error_mm: np.ndarray,
-    settings: HistorySettings,
+    section: Settings,
     visits: Visits,
     assessor: ModelInvalidation,
     seed: int,
@@ -103,7 +86,7 @@ def examples(
     """
     sizes = np.linalg.norm(error_mm, axis=1)
     truth, worst = float(sizes.max()), int(sizes.argmax())
-    larger = truth * settings.eta_ratio_larger
+    larger = truth * section["eta_ratio_larger"]
 
     def shows_fig5(world: World, eta: float) -> bool:
         if assessor.run(world, larger).rejected:
@@ -117,9 +100,9 @@ def examples(
 
     def search(name: str, eta: float, shows: Callable[[World, float], bool]) -> Example:
         """The first simulation rejected (or not, for Fig. 6) at eta that shows what it is for."""
-        nearest, simulations = None, range(settings.simulations_searched)
+        nearest, simulations = None, range(section["simulations_searched"])
         for number in with_progress(simulations, "simulations searched"):
-            world = world_of(error_mm, settings.noise_mm, number, visits, seed)
+            world = world_of(error_mm, section["noise_mm"], number, visits, seed)
             if assessor.run(world, eta).rejected != (name == REJECTED):
                 continue
             if shows(world, eta):
@@ -127,8 +110,8 @@ def examples(
             nearest = number if nearest is None else nearest
         return Example(name, nearest or 0, eta, FALLBACK, False)
 
-    fig5 = search(REJECTED, truth * settings.eta_ratio_rejected, shows_fig5)
-    fig6 = search(KEPT, truth * settings.eta_ratio_kept, shows_fig6)
+    fig5 = search(REJECTED, truth * section["eta_ratio_rejected"], shows_fig5)
+    fig6 = search(KEPT, truth * section["eta_ratio_kept"], shows_fig6)
     return [fig5, fig5._replace(example=LARGER, eta_mm=larger, rule=RULES[LARGER]), fig6]
 
 
@@ -140,7 +123,7 @@ def run(
     points, study = inputs["assessment_points"], settings["study"]
     rows = histories(
         error_vectors(points),
-        of_section(HistorySettings, settings["histories"]),
+        settings["histories"],
         of_section(Visits, study),
         of_section(ModelInvalidation, study),
         settings["seed"],

@@ -56,14 +56,6 @@ class Visits:
     visiting_order: str
 
 
-@dataclass(frozen=True)
-class StudySettings(Visits):
-    """The simulations: noise_mm, standard deviations per axis; repetitions at each of them."""
-
-    noise_mm: tuple[float, ...]
-    repetitions: int
-
-
 def assessors(section: Settings, all_readings: bool = True) -> list[Assessor]:
     """The paper's assessors by the configuration's ``study``, in the order of the paper.
 
@@ -296,17 +288,17 @@ def simulated(
 
     ``settings["all_readings"]`` false: the reading that ``study`` names alone.
     """
-    study = of_section(StudySettings, settings["study"])
+    study = settings["study"]
     part = settings.get("part") or {"number": 1, "of": 1}
     # Every of-th, so that parts take alike.
-    repetitions = range(part["number"] - 1, study.repetitions, part["of"])
+    repetitions = range(part["number"] - 1, study["repetitions"], part["of"])
     rows = simulate(
         error_vectors(inputs["assessment_points"]),
-        study.noise_mm,
+        study["noise_mm"],
         repetitions,
-        study,
+        of_section(Visits, study),
         settings["seed"],
-        assessors(settings["study"], settings.get("all_readings", True)),
+        assessors(study, settings.get("all_readings", True)),
     )
     return {"study_chunk": columns_from("study_chunk", ordered(rows))}
 
