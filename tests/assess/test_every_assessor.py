@@ -72,11 +72,11 @@ def test_a_reading_that_cannot_be_used_changes_nothing(wrong):
 @pytest.mark.parametrize(
     ("covariance", "said"),
     [
-        (np.zeros((2, 3, 3)), "point 0 is no covariance"),
-        (np.stack([np.eye(3), np.diag([1.0, 1.0, -1e-3])]), "point 1 is no covariance"),
-        (np.array([[[1.0, 0.9, 0], [0, 1, 0], [0, 0, 1]]]), "point 0 is no covariance"),
-        (np.full((1, 3, 3), np.nan), "point 0 is no covariance"),
-        (np.eye(3), "point 2 is no covariance"),
+        (np.zeros((2, 3, 3)), "point 0: is no covariance"),
+        (np.stack([np.eye(3), np.diag([1.0, 1.0, -1e-3])]), "point 1: is no covariance"),
+        (np.array([[[1.0, 0.9, 0], [0, 1, 0], [0, 0, 1]]]), "point 0: is no covariance"),
+        (np.full((1, 3, 3), np.nan), "point 0: is no covariance"),
+        (np.eye(3), "point 2: is no covariance"),
     ],
 )
 def test_covariances_that_are_none_are_refused_with_their_point(covariance, said):
