@@ -226,7 +226,7 @@ def test_a_configured_tool_stands_on_the_flange_as_that_is_turned():
     models = evaluation.equipped({}, settings, replace(ARM, flange=flange))
     wanted = TILTED @ settings["tool_mm"] + flange.position_mm
     np.testing.assert_allclose(models["nominal"].tool.position_mm, wanted, atol=1e-9)
-    assert models["dh"].travel.tolist() == [-1.0] * 6
+    assert models["nominal"].travel.tolist() == [-1.0] * 6
 
 
 def test_the_base_of_a_fitted_vec_model_stands_in_that_of_the_dh_model():
