@@ -16,7 +16,7 @@ Node = dict[str, Any]
 
 
 @cache
-def json_schema(model: type[BaseModel] = Settings) -> Node:
+def json_schema(model: type[BaseModel]) -> Node:
     """JSON Schema of a model, for editors; with ``unit`` and ``execution`` of keys."""
     return model.model_json_schema()
 

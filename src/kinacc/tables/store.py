@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
@@ -51,22 +51,6 @@ def read_table(path: Path | str) -> pd.DataFrame:
     return read_arrow(path).to_pandas()
 
 
-def arrow_schema(
-    columns: Iterable[Column], provenance: Mapping[str, object] | None = None
-) -> pa.Schema:
-    """Arrow schema of columns of an artefact, unit and meaning included."""
-    fields = [
-        pa.field(
-            column.name,
-            _ARROW_TYPES[column.kind],
-            nullable=column.nullable,
-            metadata={"unit": column.unit, "meaning": column.meaning},
-        )
-        for column in columns
-    ]
-    return pa.schema(fields, provenance and {key: str(provenance[key]) for key in PROVENANCE_KEYS})
-
-
 def to_table(
     artefact: str, columns: pd.DataFrame | Mapping[str, Any], provenance: Mapping[str, object]
 ) -> pa.Table:
@@ -111,7 +95,17 @@ def to_table(
             place = f"{where}, column {column.name}"
             arrays.append(_to_arrow(column, columns.get(column.name), count, place))
     refuse(problems, f"{artefact} does not fit its contract")
-    return pa.Table.from_arrays(arrays, schema=arrow_schema(known, provenance))
+    fields = [
+        pa.field(
+            column.name,
+            _ARROW_TYPES[column.kind],
+            nullable=column.nullable,
+            metadata={"unit": column.unit, "meaning": column.meaning},
+        )
+        for column in known
+    ]
+    marks = {key: str(provenance[key]) for key in PROVENANCE_KEYS}
+    return pa.Table.from_arrays(arrays, schema=pa.schema(fields, marks))
 
 
 def _to_arrow(column: Column, values: Any, count: int, where: str) -> pa.Array:
