@@ -32,9 +32,9 @@ def test_errors_are_measured_minus_model_in_the_robot_base():
     off = Pose(exp_so3(turn) @ clean.rotation, clean.position_mm + shift)
     found = residuals.errors(fits, full_poses(Q, compose(BASE, off)))
     for name in ("vec_vs_measured", "dh_vs_measured", "nominal_vs_measured"):
-        np.testing.assert_allclose(found[name].position_mm, np.tile(shift, (COUNT, 1)), atol=1e-9)
-        np.testing.assert_allclose(found[name].rotation_rad, np.tile(turn, (COUNT, 1)), atol=1e-12)
-    np.testing.assert_allclose(found["dh_vs_vec"].position_mm, 0.0, atol=1e-9)
+        wanted = np.tile([*shift, *1e3 * turn], (COUNT, 1))
+        np.testing.assert_allclose(found[name], wanted, rtol=0.0, atol=1e-9)
+    np.testing.assert_allclose(found["dh_vs_vec"], 0.0, atol=1e-9)
 
 
 def test_bias_is_the_mean_error_in_every_region_of_a_joint():

@@ -5,13 +5,13 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from kinacc.calibration.residuals import Errors, select
+from kinacc.calibration.residuals import select
 
 
 def selection(others, configuration, fold):
     """``model_selection`` by model, from position errors (n, 3) of each."""
     held_out = {
-        name: Errors(np.asarray(vectors, dtype=float), np.full(np.shape(vectors), np.nan))
+        name: np.hstack([vectors, np.full(np.shape(vectors), np.nan)])
         for name, vectors in others.items()
     }
     return select(held_out, configuration, fold).set_index("model")

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -16,29 +15,8 @@ from kinacc.distributions import gamma99
 from kinacc.geometry import Pose, log_so3
 
 
-@dataclass(frozen=True)
-class Errors:
-    """Errors (n, 3) in the robot base: reference minus model, mm; rotation vectors, rad.
-
-    A rotation vector w turns the model's orientation into the reference's: exp(w) R_model; NaN
-    where no orientation was measured.
-    """
-
-    position_mm: np.ndarray
-    rotation_rad: np.ndarray
-
-    def select(self, rows: np.ndarray) -> Errors:
-        """The errors of ``rows``."""
-        return Errors(self.position_mm[rows], self.rotation_rad[rows])
-
-    @property
-    def components(self) -> np.ndarray:
-        """Components (n, 6): mm, then mrad."""
-        return np.column_stack([self.position_mm, 1e3 * self.rotation_rad])
-
-
-def errors(fits: Mapping[str, Fit], observations: Observations) -> dict[str, Errors]:
-    """Errors of every comparison, each in the base of the model compared.
+def errors(fits: Mapping[str, Fit], observations: Observations) -> dict[str, np.ndarray]:
+    """Errors of every comparison: reference minus model, in the base of the model compared.
 
     A model that is the reference is taken through its own base to the instrument, and from there to
     that base.
@@ -53,7 +31,9 @@ def errors(fits: Mapping[str, Fit], observations: Observations) -> dict[str, Err
     Returns
     -------
     dict
-        ``Errors`` (n, 3) by name of the comparison, mm and rad.
+        Errors (n, 6) by name of the comparison: position in mm, then in mrad the rotation vector w
+        that turns the model's orientation into the reference's, exp(w) R_model; NaN where no
+        orientation was measured.
     """
     bases = {name: fit.frames.at_rows(observations)[0] for name, fit in fits.items()}
     poses = {name: fit.frames.seen(fit.model, observations) for name, fit in fits.items()}
@@ -71,24 +51,20 @@ def cross_validated(
     refit: Callable[[Observations, int], Mapping[str, Fit]],
     folds: Iterable[int],
     models: Collection[str],
-) -> tuple[dict[str, Errors], dict[int, dict[str, Errors]]]:
+) -> tuple[dict[str, np.ndarray], dict[int, dict[str, np.ndarray]]]:
     """Errors of every row by a model that has not seen its fold, and each fold's training errors.
 
     ``refit(train, fold)`` fits the ``models`` to the rows outside the fold. Rows without a fold
     (-1) always train and stay NaN.
     """
-    count = len(observations)
-    held_out = {
-        comparison.name: Errors(*np.full((2, count, 3), np.nan))
-        for comparison in comparisons(models)
-    }
-    trained: dict[int, dict[str, Errors]] = {}
+    nothing = np.full((len(observations), 6), np.nan)
+    held_out = {comparison.name: nothing.copy() for comparison in comparisons(models)}
+    trained: dict[int, dict[str, np.ndarray]] = {}
     for fold in folds:
         out = observations.fold == fold
         fitted = refit(observations.select(~out), fold)
         for name, off in errors(fitted, observations.select(out)).items():
-            held_out[name].position_mm[out] = off.position_mm
-            held_out[name].rotation_rad[out] = off.rotation_rad
+            held_out[name][out] = off
         trained[fold] = errors(fitted, observations.select(~out))
     return held_out, trained
 
@@ -115,14 +91,13 @@ def statistics(vectors: np.ndarray) -> tuple[int, float, float, float, float] | 
     return size.size, size.mean(), size.max(), np.sqrt(np.mean(size**2)), quantile
 
 
-def _difference(reference: Pose, model: Pose, bases: Pose) -> Errors:
-    back = np.swapaxes(bases.rotation, 1, 2)
+def _difference(reference: Pose, model: Pose, bases: Pose) -> np.ndarray:
     known = np.isfinite(reference.rotation[:, 0, 0])
-    rotation = np.full(reference.position_mm.shape, np.nan)
+    off = np.full((len(known), 2, 3), np.nan)
+    off[:, 0] = reference.position_mm - model.position_mm
     turned = reference.rotation[known] @ np.swapaxes(model.rotation[known], 1, 2)
-    rotation[known] = (back[known] @ log_so3(turned)[..., None])[..., 0]
-    position = (back @ (reference.position_mm - model.position_mm)[..., None])[..., 0]
-    return Errors(position, rotation)
+    off[known, 1] = 1e3 * log_so3(turned)
+    return (off @ bases.rotation).reshape(-1, 6)
 
 
 STANDARD_ERRORS = 2.0  # by which a gain must exceed zero
@@ -132,7 +107,7 @@ _POSITION = ["ex_mm", "ey_mm", "ez_mm"]
 
 
 def select(
-    held_out: Mapping[str, Errors], configuration: np.ndarray, fold: np.ndarray
+    held_out: Mapping[str, np.ndarray], configuration: np.ndarray, fold: np.ndarray
 ) -> pd.DataFrame:
     """Choose among models by their errors on rows held out of them, the plainest model first.
 
@@ -144,7 +119,7 @@ def select(
     Parameters
     ----------
     held_out
-        Errors by kind of model; rows that a model was not tried on are NaN.
+        Errors (n, 6) by kind of model, see ``errors``; rows that a model was not tried on are NaN.
     configuration, fold
         Numbers of the rows, shape (n,).
 
@@ -153,7 +128,7 @@ def select(
     pandas.DataFrame
         Table ``model_selection``.
     """
-    squared = pd.DataFrame({kind: np.sum(e.position_mm**2, axis=1) for kind, e in held_out.items()})
+    squared = pd.DataFrame({kind: np.sum(e[:, :3] ** 2, axis=1) for kind, e in held_out.items()})
     plainest, tried = squared.columns[0], squared.dropna()
     configuration, fold = configuration[tried.index], fold[tried.index]
     rms, folds = np.sqrt(tried.mean()), np.sqrt(tried.groupby(fold).mean()).mean()

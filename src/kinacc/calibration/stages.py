@@ -12,7 +12,7 @@ from kinacc.calibration import identifiability, residuals, tables, uncertainty
 from kinacc.calibration.fitting import Fit
 from kinacc.calibration.models import estimators, fit_all
 from kinacc.calibration.observations import Observations, from_columns
-from kinacc.calibration.residuals import Errors, errors, statistics
+from kinacc.calibration.residuals import errors, statistics
 from kinacc.config.error_models import (
     ERROR_MODELS,
     MEASURED,
@@ -142,10 +142,10 @@ def compare_models(
             rows += _statistics(name, "train", fold, trained[fold][name])
         rows += _statistics(name, "validation", np.nan, out)
         for fold in numbers:
-            rows += _statistics(name, "validation", fold, out.select(every.fold == fold))
+            rows += _statistics(name, "validation", fold, out[every.fold == fold])
         parts.append(_error_rows(measurements, name, "train", np.flatnonzero(train), fitted))
-        there = np.flatnonzero(np.isfinite(out.position_mm[:, 0]))
-        parts.append(_error_rows(measurements, name, "cross_validated", there, out.select(there)))
+        there = np.flatnonzero(np.isfinite(out[:, 0]))
+        parts.append(_error_rows(measurements, name, "cross_validated", there, out[there]))
     pose_errors = pd.concat(parts, ignore_index=True)
     frames = {
         "pose_errors": pose_errors,
@@ -181,7 +181,7 @@ def excluded_rows(inputs: Tables, settings: Settings) -> Tables:
     rows = pd.DataFrame(dict(reading.columns)) if reading else pd.DataFrame(columns=list(used))
     for name in ("target", "session"):  # only those of other rows have frames
         rows = rows[rows[name].map(str).isin({*map(str, used[name])})]  # None as well
-    off: dict[str, Errors] = {}
+    off: dict[str, np.ndarray] = {}
     if len(rows):
         observations = from_columns({name: rows[name].to_numpy() for name in rows}, arm)
         off = errors(delivered_fits(inputs, arm, observations), observations)
@@ -189,7 +189,7 @@ def excluded_rows(inputs: Tables, settings: Settings) -> Tables:
     stated = pd.DataFrame(sorted(reasons.items()), columns=["line", "reason"])
     parts = []
     for comparison in comparisons(models.models(inputs, arm.dh)):
-        known[list(_OFF)] = off[comparison.name].components if off else np.nan
+        known[list(_OFF)] = off[comparison.name] if off else np.nan
         parts.append(stated.merge(known, "left", on="line").assign(comparison=comparison.name))
     table = pd.concat(parts).astype(object)
     table = table.where(table.notna(), None)
@@ -214,7 +214,7 @@ def delivered_fits(inputs: Tables, robot: Robot, every: Observations) -> dict[st
     return fits
 
 
-def selection(every: Observations, held_out: Mapping[str, Errors]) -> pd.DataFrame:
+def selection(every: Observations, held_out: Mapping[str, np.ndarray]) -> pd.DataFrame:
     """``model_selection`` from errors ``held_out`` of every row, by name of the comparison."""
     names = {kind: Comparison(MEASURED, kind).name for kind in ERROR_MODELS}
     of_kinds = {kind: held_out[name] for kind, name in names.items() if name in held_out}
@@ -222,23 +222,21 @@ def selection(every: Observations, held_out: Mapping[str, Errors]) -> pd.DataFra
     return residuals.select(of_kinds, configuration, every.fold)
 
 
-def _statistics(name: str, subset: str, fold: float, off: Errors) -> Iterator[tuple[Any, ...]]:
+def _statistics(name: str, subset: str, fold: float, off: np.ndarray) -> Iterator[tuple[Any, ...]]:
     """Rows of ``residuals``."""
-    for quantity, unit, vectors in (
-        ("position", "mm", off.position_mm),
-        ("orientation", "mrad", 1e3 * off.rotation_rad),
-    ):
+    parts = zip(("position", "orientation"), ("mm", "mrad"), np.hsplit(off, 2), strict=True)
+    for quantity, unit, vectors in parts:
         figures = statistics(vectors)
         if figures is not None:
             yield (name, subset, fold, quantity, unit, *figures)
 
 
 def _error_rows(
-    measurements: Columns, comparison: str, estimate: str, rows: np.ndarray, off: Errors
+    measurements: Columns, comparison: str, estimate: str, rows: np.ndarray, off: np.ndarray
 ) -> pd.DataFrame:
     """``pose_errors`` of the ``rows`` of measurements that the errors are of."""
     table = pd.DataFrame({"comparison": comparison, "estimate": estimate, "row": rows})
     for name in ("pose", "target", "repeat", "subset", "fold"):
         table[name] = np.asarray(measurements[name])[rows]
-    table[list(_OFF)] = off.components
+    table[list(_OFF)] = off
     return table

@@ -16,7 +16,7 @@ import pandas as pd
 from kinacc.calibration.fitting import Fit, fit_frames
 from kinacc.calibration.frames import ANGLE_UNIT_RAD, Frames, frame_terms, stacked
 from kinacc.calibration.observations import Observations, from_columns
-from kinacc.calibration.residuals import Errors, errors
+from kinacc.calibration.residuals import errors
 from kinacc.calibration.summary import LARGE_SHARE, held_out_errors
 from kinacc.calibration.tables import frames_of
 from kinacc.config.error_models import ERROR_MODELS, MEASURED, NOMINAL, Comparison
@@ -154,7 +154,7 @@ def verify(
     new = replace(new, rotation=np.full_like(new.rotation, np.nan))
     calibration = _at_session(tables, kind, new, moved)
     frames = frames_at(calibration, new, moved, rotation_weight_mm_per_rad)
-    off_mm = errors_of(calibration, frames, new).position_mm
+    off_mm = errors_of(calibration, frames, new)[:, :3]
     fresh = error_columns(model, robot, new, frames.targets, moved, off_mm)
     if fresh.columns[..., -1].size <= fresh.rank:
         return replace(result, reason="base and tool explain all that these poses show")
@@ -192,7 +192,7 @@ def model_errors(
         frames = frames_at(calibration, part, moved, rotation_weight_mm_per_rad)
         off = errors_of(calibration, frames, part)
         row: list[object] = [kind, len(part)]
-        for vectors in (off.position_mm, 1e3 * off.rotation_rad):
+        for vectors in np.hsplit(off, 2):
             row += statistics(np.linalg.norm(vectors, axis=1))
         rows.append(row)
     columns = [f"{name}_{unit}" for unit in ("mm", "mrad") for name in STATISTICS]
@@ -285,8 +285,8 @@ def _at_session(
     return folder.calibration(tables, kind, session=session)
 
 
-def errors_of(calibration: Calibration, frames: Frames, readings: Observations) -> Errors:
-    """Errors of a calibrated model at ``readings``, with their bases and targets."""
+def errors_of(calibration: Calibration, frames: Frames, readings: Observations) -> np.ndarray:
+    """Errors (n, 6), mm and mrad, of a calibrated model, bases and targets at ``readings``."""
     fit = Fit(calibration.model, frames)
     comparison = Comparison(MEASURED, calibration.choice)
     return errors({calibration.choice: fit}, readings)[comparison.name]

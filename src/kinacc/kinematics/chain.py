@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from kinacc.geometry import Pose, project_so3
+from kinacc.geometry import Pose, cross, inverse_transposed, project_so3
 
 if TYPE_CHECKING:
     from kinacc.kinematics.dh import DHModel
@@ -102,7 +102,7 @@ class Walk:
             # raw = P Q, P symmetric; a small turn w of Q: (tr(P) - P) w = skew part of d(raw) Q'.
             self.stretch = np.einsum("ikn,jkn->ijn", raw, rotation)
             trace = self.stretch[0, 0] + self.stretch[1, 1] + self.stretch[2, 2]
-            self.rate = _inverse(trace * np.eye(3)[..., None] - self.stretch)
+            self.rate = inverse_transposed(trace * np.eye(3)[..., None] - self.stretch)
 
     def shift(self, frames: Columns, axis: int, into: np.ndarray) -> None:
         """Motion (6, n) of the flange per mm along an axis of ``frames``."""
@@ -126,14 +126,15 @@ class Walk:
         pushed, reach = behind
         u, v = (axis + 1) % 3, (axis + 2) % 3
         into[:3] = frames[v] * reach[u] - frames[u] * reach[v]
-        into[3:] = _times(self.rate, cross(pushed[u], frames[v]) - cross(pushed[v], frames[u]))
+        turned = cross(pushed[u], frames[v]) - cross(pushed[v], frames[u])
+        into[3:] = np.einsum("ijn,jn->in", self.rate, turned)
 
     def inverse(self, frames: Columns) -> tuple[np.ndarray, np.ndarray]:
         """Rows of the inverse axes (3, 3, n), stretched, and the flange (3, n) seen from there."""
-        rows = _inverse(np.stack(frames[:3], axis=1))
+        rows = inverse_transposed(np.stack(frames[:3]))
         reach = self.end.p_mm - frames.p_mm
-        pushed = [_times(self.stretch, row) for row in rows]
-        return np.stack(pushed), np.stack([_dot(row, reach) for row in rows])
+        pushed = np.einsum("ijn,rjn->rin", self.stretch, rows)
+        return pushed, np.einsum("rin,in->rn", rows, reach)
 
     def by_joint(self, joint: int, into: np.ndarray) -> None:
         """Motion (6, n) of the flange per rad, or mm, of a joint."""
@@ -163,25 +164,3 @@ class Walk:
                 self.shift(here, axis, into[axis])
                 self.turn(here, axis, into[3 + axis], behind)
         return moved
-
-
-def cross(one: np.ndarray, other: np.ndarray) -> np.ndarray:
-    """Cross products (3, n) of columns (3, n), in less time than ``np.cross``."""
-    (a, b, c), (u, v, w) = one, other
-    return np.stack([b * w - c * v, c * u - a * w, a * v - b * u])
-
-
-def _dot(one: np.ndarray, other: np.ndarray) -> np.ndarray:
-    return np.asarray(np.sum(one * other, axis=0))
-
-
-def _times(matrix: np.ndarray, vector: np.ndarray) -> np.ndarray:
-    """Matrices (3, 3, n) times vectors (3, n)."""
-    return matrix[:, 0] * vector[0] + matrix[:, 1] * vector[1] + matrix[:, 2] * vector[2]
-
-
-def _inverse(matrix: np.ndarray) -> np.ndarray:
-    """Inverses of matrices (3, 3, n), from the cross products of their columns."""
-    x, y, z = matrix.transpose(1, 0, 2)
-    rows = np.stack([cross(y, z), cross(z, x), cross(x, y)])
-    return rows / _dot(x, rows[0])

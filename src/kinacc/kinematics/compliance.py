@@ -15,7 +15,7 @@ from typing import ClassVar, Self
 
 import numpy as np
 
-from kinacc.geometry import Pose
+from kinacc.geometry import Pose, cross
 from kinacc.kinematics import chain as _chain
 from kinacc.kinematics import dh as _dh
 from kinacc.kinematics.dh import DHModel
@@ -121,9 +121,9 @@ class ComplianceModel(ErrorModel):
             weight = weight + links[joint, 0]
             first = first + links[joint, 0] * _place(ends[joint], links[joint, 1:])
             axis, origin = walk.before[joint].z, walk.before[joint].p_mm
-            known = _chain.cross(axis, first - weight * origin)
+            known = cross(axis, first - weight * origin)
             moments[:, joint, 0] = _NM_PER_KG_MM * (self.gravity @ known)
-            moments[:, joint, 1] = self.gravity @ _chain.cross(axis, walk.end.p_mm - origin)
+            moments[:, joint, 1] = self.gravity @ cross(axis, walk.end.p_mm - origin)
         return moments
 
     def to_columns(self, std: np.ndarray) -> dict[str, np.ndarray]:

@@ -134,7 +134,7 @@ def _require_fitting(robot: Robot, maker: Controller) -> None:
         raise input_error(f"robot {robot.name}", message, fix="use --format urdf")
 
 
-def _mean_errors(tables: Tables, maker: Controller, off: residuals.Errors) -> pd.DataFrame:
+def _mean_errors(tables: Tables, maker: Controller, off: np.ndarray) -> pd.DataFrame:
     """Mean errors of the controller's model, the calibrated and the nominal one."""
     recorded, selected = pd.DataFrame(tables["residuals"]), selected_model(tables)
     recorded = recorded[recorded["fold"].isna()]
@@ -148,9 +148,7 @@ def _mean_errors(tables: Tables, maker: Controller, off: residuals.Errors) -> pd
         f"{NOMINAL}_vs_measured": "nominal, base and tool fitted",
     }
     means = means.reindex(index=[*models], columns=["position", "orientation"])
-    position_mm, turn_mrad = (
-        np.linalg.norm(part, axis=1) for part in (off.position_mm, 1e3 * off.rotation_rad)
-    )
+    position_mm, turn_mrad = (np.linalg.norm(part, axis=1) for part in np.hsplit(off, 2))
     means.loc["controller"] = pd.Series(position_mm).mean(), pd.Series(turn_mrad).mean()
     return pd.DataFrame({
         "model": [*models.values()],
