@@ -40,7 +40,7 @@ def mean_errors(arm, train, test, *kinds):
     fits = models.fit_all(train, [every[kind] for kind in kinds])
     found = errors(fits, test)
     return [
-        np.linalg.norm(found[f"{kind}_vs_measured"].position_mm, axis=1).mean()
+        np.linalg.norm(found[f"{kind}_vs_measured"][:, :3], axis=1).mean()
         for kind in (*kinds, "nominal")
     ]
 

@@ -23,7 +23,7 @@ def held_out(name, kind="dh"):
         train, out = every.select(every.fold != fold), every.fold == fold
         fits = fit_all(train, [estimator.chosen(choices, int(fold))])
         of_fold = errors(fits, every.select(out))
-        found[out] = of_fold[f"{kind}_vs_measured"].position_mm
+        found[out] = of_fold[f"{kind}_vs_measured"][:, :3]
     return every, pd.DataFrame(found)
 
 

@@ -63,9 +63,9 @@ def test_normal_equations_are_those_of_the_written_out_jacobian(name, estimated)
     residual, jacobian = (np.concatenate(part) for part in zip(*system.blocks(x), strict=True))
     np.testing.assert_allclose(residual, system.residual(x), rtol=1e-12)
     both = np.column_stack([jacobian, residual])
-    unit = np.linalg.norm(both, axis=0) + 1e-30
-    both, scaled = both / unit, system.normal(x) / np.outer(unit, unit)
-    np.testing.assert_allclose(scaled, both.T @ both, atol=1e-12)
+    unit = np.append(1.0 / (np.linalg.norm(jacobian, axis=0) + 1e-30), 1.0)
+    both = both * unit
+    np.testing.assert_allclose(system.normal(x, unit[:-1]), both.T @ both, rtol=1e-12, atol=1e-12)
 
 
 def test_motions_of_frames_are_their_finite_differences():

@@ -91,13 +91,13 @@ class PoseSystem:
             rows = columns.transpose(2, 1, 0)[measured.T]
             yield rows[:, -1], rows[:, :-1]
 
-    def normal(self, x: np.ndarray) -> np.ndarray:
-        """Gram matrix (P+1, P+1) of ``[J | r]``: normal equations and, last, the cost."""
-        total = np.zeros((self.size + 1, self.size + 1))
+    def normal(self, x: np.ndarray, scale: np.ndarray) -> np.ndarray:
+        """Normal equations (P+1, P+1) in units of ``scale`` (P,): Gram matrix of ``[J | r]``."""
+        unit, total = np.append(scale, 1.0), np.zeros((self.size + 1, self.size + 1))
         for columns, _ in self.columns(x):
             flat = columns.reshape(self.size + 1, -1)
             total += flat @ flat.T
-        return total
+        return total * np.outer(unit, unit)
 
     def columns(self, x: np.ndarray) -> Iterator[tuple[np.ndarray, np.ndarray]]:
         """Weighted ``[J | r]`` (P+1, c, n) per block, 0 where nothing was measured; a mask (c, n).
@@ -444,9 +444,7 @@ def placed(
     still = np.zeros(len(arm.start), dtype=bool)
     system = PoseSystem(observations, arm, still, coordinates, rotation_weight_mm_per_rad)
     keep = np.flatnonzero(coordinates.free)
-    gram = system.normal(coordinates.begin)[:-1, :-1] * np.outer(
-        coordinates.scale, coordinates.scale
-    )
+    gram = system.normal(coordinates.begin, coordinates.scale)[:-1, :-1]
     values, vectors = np.linalg.eigh(gram[np.ix_(keep, keep)])
     hidden = vectors[:, values <= SHOWN**2 * max(values[-1:], default=0.0)].T
     hidden = _without_known(hidden, np.isfinite(coordinates.std[keep]))

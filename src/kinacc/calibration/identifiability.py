@@ -275,8 +275,7 @@ def left_open(fit: ModelFit, known: Uncertainty, observations: Observations) -> 
     rotation = np.where(rows.has_rotation[:, None, None], predicted.rotation, np.nan)
     everywhere = replace(rows, position_mm=predicted.position_mm, rotation=rotation)
     system = PoseSystem(everywhere, fit.model, fit.free.ravel(), fit.parameters, UNSEEN_WEIGHT)
-    scale = np.append(fit.solution.scale, 1.0)
-    gram = system.normal(fit.solution.x) * np.outer(scale, scale)
+    gram = system.normal(fit.solution.x, fit.solution.scale)
     thresholds = STRUCTURAL, STRUCTURAL
     unseen = Split.of(gram, system.frames.size, np.zeros(system.size), thresholds).lost.T
     return LeftOpen.of(named_directions(fit, unseen), known.undetermined, known.names, fit.frames)

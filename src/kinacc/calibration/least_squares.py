@@ -321,8 +321,8 @@ class Descent:
 
     def look(self, x: np.ndarray) -> float:
         """Normal equations at ``x`` and the objective there."""
-        keep, unit = np.append(self.active, True), np.append(self.unit, 1.0)
-        self.gram = self.system.normal(x)[keep][:, keep] * np.outer(unit, unit)
+        keep = np.append(self.active, True)
+        self.gram = self.system.normal(x, self.scale)[keep][:, keep]
         self.cost = float(self.gram[-1, -1])
         self.displacement = (x - self.nominal)[self.active] / self.unit
         return self.objective

@@ -259,21 +259,21 @@ class _Linear:
         # A reading that no arm with constant errors comes near bends high orders most.
         for _ in range(_SCREENINGS):
             system, start, scale = self._system(0)
-            normal = system.normal(start) * np.outer(scale, scale)
+            normal = system.normal(start, scale)
             step = -np.linalg.solve(_steady(normal[:-1, :-1]), normal[:-1, -1])
-            to = scale * np.append(step, 1.0)
+            to = np.append(scale * step, 1.0)
             parts = [np.tensordot(to, part[:, :3], 1) for part, _ in system.columns(start)]
             squared = np.sum(np.concatenate(parts, axis=1) ** 2, axis=0) / self.root**2
             far = max(FAR**2 * float(np.median(squared)), np.finfo(float).tiny)
             self.root = once(observations) * np.sqrt(far / np.maximum(squared, far))
 
     def _system(self, order: int) -> tuple[PoseSystem, np.ndarray, np.ndarray]:
-        """The system, where it is linearised, and the scale of ``[J | r]``."""
+        """The system, where it is linearised, and the scale of its columns."""
         empty = vec.without_errors(self.empty.dh, self.empty.q_min_rad, self.empty.q_max_rad, order)
         free, frames = informed(self.observations, empty), self.parameters
         system = PoseSystem(self.observations, empty, free, frames, self.weight, self.root)
         start = np.concatenate([frames.begin, np.zeros(free.sum())])
-        return system, start, np.concatenate([frames.scale * frames.free, scales(empty)[free], [1]])
+        return system, start, np.append(frames.scale * frames.free, scales(empty)[free])
 
     def above_constants(self, order: int, highest: int) -> tuple[np.ndarray, float]:
         """Gram matrix of ``[r | J]`` above order 0 up to ``order``, and the count of residuals.
@@ -283,12 +283,12 @@ class _Linear:
         if order > self.built:
             self.built = min(max(order, _FIRST), highest) if order <= _FIRST else highest
             system, start, scale = self._system(self.built)
-            degree = np.zeros(len(scale))
+            degree = np.zeros(len(scale) + 1)
             series = self.parameters.size + np.arange(self.motions * (self.built + 1))
             degree[series] = np.tile(np.arange(self.built + 1), self.motions)
             degree[-1] = 0.5  # the residual follows what every order has
             place, flat = np.argsort(degree, kind="stable"), int(np.sum(degree == 0.0))
-            normal = (system.normal(start) * np.outer(scale, scale))[np.ix_(place, place)]
+            normal = system.normal(start, scale)[np.ix_(place, place)]
             factor = np.linalg.cholesky(_steady(normal[:flat, :flat]))
             sides = scipy.linalg.solve_triangular(factor, normal[:flat, flat:], lower=True)
             self.gram = normal[flat:, flat:] - sides.T @ sides
