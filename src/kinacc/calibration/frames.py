@@ -355,26 +355,22 @@ def closed_form_start(observations: Observations, flange: Pose) -> Frames:
     for session in np.argsort(-sizes, kind="stable")[: np.count_nonzero(sizes)]:
         rows = np.flatnonzero(observations.session == session)
         part, at = observations.select(rows), flange.select(rows)
-        measured = np.isin(np.arange(names), part.target)
-        new = measured & ~placed
-        if not placed[measured].any():
-            base, points = one_session(part, at)
-            start.targets.position_mm[new] = points[new]
-        else:
-            seen = placed[part.target]
+        seen = placed[part.target]
+        if seen.any():
             base = base_from_targets(part.select(seen), at.select(seen), start.targets)
-            in_base = (part.position_mm - base.position_mm) @ base.rotation - at.position_mm
-            points = np.einsum("nji,nj->ni", at.rotation, in_base)
-            for target in np.flatnonzero(new):
-                start.targets.position_mm[target] = points[part.target == target].mean(axis=0)
-        for target in np.flatnonzero(new):
-            turned = part.has_rotation & (part.target == target)
-            if turned.any():
-                turns = np.swapaxes(at.rotation[turned], 1, 2) @ base.rotation.T
-                mean = Rotation.from_matrix(turns @ part.rotation[turned]).mean()
-                start.targets.rotation[target] = mean.as_matrix()
+        else:
+            base = one_session(part, at)[0]
         start.bases.rotation[session], start.bases.position_mm[session] = base
-        placed |= measured
+        in_base = (part.position_mm - base.position_mm) @ base.rotation - at.position_mm
+        points = np.einsum("nji,nj->ni", at.rotation, in_base)
+        turns = np.swapaxes(at.rotation, 1, 2) @ base.rotation.T @ part.rotation
+        for target in np.setdiff1d(part.target, np.flatnonzero(placed)):
+            here = part.target == target
+            start.targets.position_mm[target] = points[here].mean(axis=0)
+            turned = turns[here & part.has_rotation]
+            if len(turned):
+                start.targets.rotation[target] = Rotation.from_matrix(turned).mean().as_matrix()
+            placed[target] = True
     return start
 
 

@@ -69,13 +69,11 @@ class LeftOpen:
         frames : Frames
             Base and targets of the fit.
         """
-        arm = of_arm(names)
-        exact, shown = _apart(hidden, arm), _apart(undetermined, arm)
-        structural = [_sparse(rows, among) for rows, among in zip(exact, (~arm, arm), strict=True)]
-        weak = [
-            _sparse(_beside(rows, known, among), among)
-            for rows, known, among in zip(shown, exact, (~arm, arm), strict=True)
-        ]
+        arm, structural, weak = of_arm(names), [], []
+        kinds = zip((~arm, arm), _apart(hidden, arm), _apart(undetermined, arm), strict=True)
+        for among, exact, shown in kinds:
+            structural.append(_sparse(exact, among))
+            weak.append(_sparse(_beside(shown, exact, among), among))
         directions = np.concatenate([*structural, *weak])
         count = sum(map(len, structural))
         return cls(directions, np.arange(len(directions)) < count, tuple(names), frames)
@@ -174,16 +172,9 @@ def parameter_name(name: str) -> str:
 
 def _apart(rows: np.ndarray, arm: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Directions of frames alone, and the others; together they span what ``rows`` span."""
-    moving = np.abs(rows[:, arm]).max(axis=1, initial=0.0) > 0.0
-    alone, others = rows[~moving], rows[moving]
-    if not len(others):
-        return alone, others
-    directions, values, _ = np.linalg.svd(others[:, arm])
-    count = int(np.sum(values > _RANK * values[0]))
-    if count == len(others):
-        return alone, others
-    mixed = directions.T @ others
-    return np.concatenate([alone, mixed[count:]]), mixed[:count]
+    turn, values, _ = np.linalg.svd(rows[:, arm])
+    count, mixed = int(np.sum(values > _RANK * values.max(initial=0.0))), turn.T @ rows
+    return mixed[count:], mixed[:count]
 
 
 def _beside(rows: np.ndarray, exact: np.ndarray, among: np.ndarray) -> np.ndarray:

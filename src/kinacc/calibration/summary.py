@@ -23,7 +23,10 @@ TOLERANCE_OF = {
     "bound": "upper bound of a campaign",
 }
 _ORDER = (NOMINAL, *SELECTABLE)
-_UNITS = {"position": "mm", "orientation": "mrad"}
+_AXES = {
+    "position": ("mm", ["ex_mm", "ey_mm", "ez_mm"]),
+    "orientation": ("mrad", ["rx_mrad", "ry_mrad", "rz_mrad"]),
+}
 _PARALLEL_DEG = 5.0  # a flange axis that turns less is called parallel in all poses
 _LEAST_LENGTH = 1e-9
 
@@ -108,25 +111,22 @@ def error_statistics(pose_errors: Columns, configuration: np.ndarray) -> pd.Data
     over configurations (Cochran, Sampling Techniques, 1977, eq. 6.13); NaN for a single one. It
     assumes configurations drawn independently, and fitted models as they are.
     """
-    errors = pd.DataFrame({name: pose_errors[name] for name in ("comparison", "estimate", "row")})
+    errors = pd.DataFrame(dict(pose_errors))
     errors["configuration"] = configuration[errors["row"]]
-    for quantity, unit in _UNITS.items():
-        prefix = "e" if quantity == "position" else "r"
-        parts = [np.asarray(pose_errors[f"{prefix}{axis}_{unit}"], dtype=float) for axis in "xyz"]
-        errors[quantity] = np.linalg.norm(parts, axis=0)
     known = sorted(COMPARISONS, key=lambda comparison: _ORDER.index(comparison.model))
     errors = errors[errors["comparison"].isin([comparison.name for comparison in known])]
     tried = errors.groupby(["estimate", "row"])["comparison"].transform("nunique")
     errors = errors[tried == errors.groupby("estimate")["comparison"].transform("nunique")]
     groups = dict(list(errors.groupby(["comparison", "estimate"])))
     rows = []
-    for comparison, quantity, estimate in product(known, _UNITS, ("cross_validated", "train")):
-        group = groups.get((comparison.name, estimate), errors[:0]).dropna(subset=quantity)
+    for comparison, quantity, estimate in product(known, _AXES, ("cross_validated", "train")):
+        unit, axes = _AXES[quantity]
+        group = groups.get((comparison.name, estimate), errors[:0]).dropna(subset=axes)
         if group.empty:
             continue
-        size = group[quantity]
-        off = (size - size.mean()).groupby(group["configuration"]).sum()
-        spread = np.sqrt(len(off) * np.sum(off**2) / (len(off) - 1)) if len(off) > 1 else np.nan
+        size = np.sqrt(np.square(group[axes].astype(float)).sum(axis=1))
+        of_configurations = (size - size.mean()).groupby(group["configuration"]).sum()
+        count = len(of_configurations)
         rows.append(
             {
                 "comparison": comparison.name,
@@ -134,14 +134,14 @@ def error_statistics(pose_errors: Columns, configuration: np.ndarray) -> pd.Data
                 "model": comparison.model,
                 "estimate": estimate,
                 "quantity": quantity,
-                "unit": _UNITS[quantity],
+                "unit": unit,
                 "n": len(size),
                 "mean": size.mean(),
                 "quantile_99": size.quantile(LARGE_SHARE),
                 "largest": size.max(),
                 "rms": np.sqrt(np.mean(size**2)),
-                "std_error": spread / len(size),
-                "configurations": len(off),
+                "std_error": of_configurations.std() * np.sqrt(count) / len(size),
+                "configurations": count,
             }
         )
     return pd.DataFrame(rows)

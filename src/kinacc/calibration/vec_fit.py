@@ -122,16 +122,16 @@ def _with_centred_offsets(fit: ModelFit, observations: Observations) -> ModelFit
     Without it the prior splits the constant between both, and a pose at s = 0 loses a part.
     """
     free, frames, solution = fit.free, fit.parameters.size, fit.solution
-    if not observations.s.any():
+    offsets = np.arange(free.size)[-2 * observations.joints :].reshape(-1, 2)
+    centred = observations.s.all(axis=0) & free[offsets].all(axis=1)
+    if not centred.any():
         return fit
-    place, mapping = frames - 1 + np.cumsum(free), np.eye(len(solution.x))
-    names = dict(zip(fit.model.names, range(free.size), strict=True))
-    for joint, travelled in enumerate(np.all(observations.s, axis=0).tolist(), 1):
-        offsets = [names[f"j{joint}.eps_z.minus"], names[f"j{joint}.eps_z.plus"]]
-        if travelled and free[offsets].all():
-            both = place[offsets]
-            mapping[place[names[f"j{joint}.eps_z.0"]], both] += 0.5
-            mapping[both[:, None], both] -= 0.5
+    change = np.eye(free.size)
+    for joint in np.flatnonzero(centred):
+        both = offsets[joint]
+        change[fit.model.names.index(f"j{joint + 1}.eps_z.0"), both] += 0.5
+        change[both[:, None], both] -= 0.5
+    mapping = scipy.linalg.block_diag(np.eye(frames), change[free][:, free])
     covariance = mapping @ solution.covariance @ mapping.T
     solution = replace(
         solution,
@@ -139,9 +139,8 @@ def _with_centred_offsets(fit: ModelFit, observations: Observations) -> ModelFit
         covariance=covariance,
         std=np.sqrt(np.maximum(np.diag(covariance), 0.0)),
     )
-    vector = np.zeros(free.size)
-    vector[free] = solution.x[frames:]
-    return replace(fit, model=fit.model.with_parameters(vector), solution=solution)
+    model = fit.model.with_parameters(change @ fit.model.start)
+    return replace(fit, model=model, solution=solution)
 
 
 ORDERS = (1, 2, 3, 4, 5, 6, 8, 10, 12, 16, 20, 28, 40)

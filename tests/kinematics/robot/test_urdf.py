@@ -167,7 +167,7 @@ def test_a_yaml_chooses_the_chain_and_adds_what_a_urdf_lacks(tmp_path):
     assert "did you mean tip_link?" in said
     assert "dh: unknown key 'dh'" in said
     path.write_text("urdf: other.urdf\n")
-    assert "there is no such file" in refusal(robot.load, path)
+    assert "other.urdf: no such file" in refusal(robot.load, path)
 
 
 # --- faults ---------------------------------------------------------------------------------------

@@ -30,8 +30,6 @@ def reported_joints(robot: Robot, q_rad: np.ndarray) -> np.ndarray:
     numpy.ndarray
         Reported joints, shape (..., k).
     """
-    if np.array_equal(robot.joint_map, np.eye(len(robot.joint_map))):
-        return q_rad
     return q_rad @ np.linalg.inv(robot.joint_map).T
 
 

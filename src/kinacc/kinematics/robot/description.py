@@ -223,13 +223,12 @@ class Table(_About):
         limits = []
         for number, (row, listed) in enumerate(zip(self.dh, shared, strict=True), 1):
             slides = row.joint == "prismatic"
-            ends = row.limits_mm if slides else row.limits_rad or listed
-            if not slides and row.limits_rad and listed:
-                raise ValueError(f"joint {number}: its limits are given twice")
-            if ends is None:
+            stated = [row.limits_mm] if slides else [row.limits_rad, listed]
+            ends = [pair for pair in stated if pair is not None]
+            if len(ends) != 1:
                 units = "limits_mm or limits_m" if slides else "limits_deg or limits_rad"
-                raise ValueError(f"joint {number}: its limits are missing: {units}")
-            limits.append(ends)
+                raise ValueError(f"joint {number}: its limits are to be given once: {units}")
+            limits += ends
         return np.array(limits)
 
 
@@ -339,8 +338,6 @@ def _described(document: Document, path: Path) -> Robot:
             return Table.model_validate(document.data).robot()
         described = ByUrdf.model_validate(document.data)
         file = path.parent / described.urdf
-        if not os.path.isfile(file):
-            raise input_error(document.place(("urdf",)), f"{file}: there is no such file")
         robot = _urdf.load(file, described.base_link, described.tip_link)
         return replace(
             robot,
