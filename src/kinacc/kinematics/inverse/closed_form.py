@@ -85,29 +85,30 @@ class SixAxes:
         reached : numpy.ndarray
             Whether a pose is in reach, shape (n, 8).
         """
+        # Arrays (n, 2, 2, 2): poses, then the sides of shoulder, elbow and wrist.
+        shoulder, elbow, wrist = _SIDES[:, None, None], _SIDES[:, None], _SIDES
         dh = self.dh
         sine, cosine = np.sign(np.sin(dh.alpha_rad)), np.sign(np.cos(dh.alpha_rad))
         s1, s2, s3, s4, s5 = sine[0], cosine[1], cosine[2], sine[3], sine[4]
         rotation, point = before_last(dh, pose)
         sideways = dh.d_mm[1] + s2 * (dh.d_mm[2] + np.cos(dh.alpha_rad[2]) * dh.d_mm[3])
         side = -s1 * sideways if abs(sideways) > _TOLERANCE else 0.0
-        x, y, z = point.T[..., None]
+        x, y, z = point.T[..., None, None, None]
         square = x * x + y * y
-        ahead = _SIDES * np.sqrt(np.maximum(square - side * side, start.least_radius_mm**2))
-        theta_1 = np.arctan2(y * ahead - x * side, x * ahead + y * side)  # (n, 2)
+        ahead = shoulder * np.sqrt(np.maximum(square - side * side, start.least_radius_mm**2))
+        theta_1 = np.arctan2(y * ahead - x * side, x * ahead + y * side)
         reached = square >= max(abs(side) - start.reach_margin_mm, 0.0) ** 2 * (1.0 - 1e-12)
         plane = rotation_z(theta_1) @ rotation_x(dh.alpha_rad[0])  # along axes 2, 3 and 4
-        turned = np.swapaxes(plane, -1, -2) @ rotation[:, None]
-        u, v = (ahead - dh.a_mm[0])[..., None], (s1 * (z - dh.d_mm[0]) + 0.0 * ahead)[..., None]
-        elbow = -s1 * _SIDES[:, None] * _SIDES
-        flips = _SIDES * (1.0 if np.cos(dh.theta_offset_rad[4]) >= 0.0 else -1.0)
+        turned = np.swapaxes(plane, -1, -2) @ rotation[:, None, None, None]
+        u, v = ahead - dh.a_mm[0], s1 * (z - dh.d_mm[0])
+        elbow = -s1 * np.sign(dh.a_mm[1]) * shoulder * elbow
+        flips = wrist * (1.0 if np.cos(dh.theta_offset_rad[4]) >= 0.0 else -1.0)
         if self.parallel:
             # Rz(phi) Rx(alpha) Rz(theta_5) Rx(alpha_5) Rz(theta_6), from its end.
             alpha = dh.alpha_rad[1:4].sum()
-            theta_6, theta_5, phi = (
-                -part[:, :, None]
-                for part in _wrist(
-                    np.swapaxes(turned, -1, -2)[:, :, None],
+            theta_6, theta_5, phi = np.negative(
+                _wrist(
+                    np.swapaxes(turned, -1, -2),
                     (-s5, -np.sign(np.sin(alpha))),
                     -flips,
                     -dh.theta_offset_rad[5],
@@ -115,28 +116,24 @@ class SixAxes:
                 )
             )
             reach = np.sin(alpha) * dh.d_mm[4]
-            u = u[..., None] - reach * np.sin(phi) - dh.a_mm[3] * np.cos(phi)
-            v = v[..., None] + reach * np.cos(phi) - dh.a_mm[3] * np.sin(phi)
-            lengths = dh.a_mm[1], dh.a_mm[2]
-            elbow = elbow[..., None] * np.sign(dh.a_mm[1] * dh.a_mm[2])
-            theta_2, bend, within = _triangle(u, v, *lengths, elbow, start)
-            theta_4 = s2 * s3 * (phi - theta_2 - bend)
-            theta = theta_1[..., None, None], theta_2, s2 * bend, theta_4, theta_5, theta_6
+            u = u - reach * np.sin(phi) - dh.a_mm[3] * np.cos(phi)
+            v = v + reach * np.cos(phi) - dh.a_mm[3] * np.sin(phi)
+            elbow = elbow * np.sign(dh.a_mm[2])
+            theta_2, bend, within = _triangle(u, v, dh.a_mm[1], dh.a_mm[2], elbow, start)
+            theta_3, theta_4 = s2 * bend, s2 * s3 * (phi - theta_2 - bend)
         else:
             along, across = dh.a_mm[2], -np.sin(dh.alpha_rad[2]) * dh.d_mm[3]
-            lengths = dh.a_mm[1], np.hypot(along, across)
-            elbow = elbow * np.sign(dh.a_mm[1])
-            theta_2, bend, within = _triangle(u, v, *lengths, elbow, start)
+            forearm = np.hypot(along, across)
+            theta_2, bend, within = _triangle(u, v, dh.a_mm[1], forearm, elbow, start)
             theta_3 = s2 * bend - np.arctan2(across, along)
             arm = rotation_z(theta_2 + s2 * theta_3) @ rotation_x(dh.alpha_rad[1:3].sum())
-            left = np.swapaxes(arm, -1, -2) @ turned[:, :, None]
-            last = _wrist(left[:, :, :, None], (s4, s5), flips, dh.theta_offset_rad[3])
-            first = theta_1[..., None, None], theta_2[..., None], theta_3[..., None]
-            theta, within = (*first, *last), within[..., None]
-        shape = len(x), 2, 2, 2
+            left = np.swapaxes(arm, -1, -2) @ turned
+            theta_4, theta_5, theta_6 = _wrist(left, (s4, s5), flips, dh.theta_offset_rad[3])
+        theta = theta_1, theta_2, theta_3, theta_4, theta_5, theta_6
+        shape = len(point), 2, 2, 2
         q_rad = np.stack([np.broadcast_to(part, shape) for part in theta], axis=-1)
         q_rad = _one_turn(q_rad - dh.theta_offset_rad).reshape(-1, 8, 6)
-        return q_rad, np.broadcast_to(reached[..., None, None] & within, shape).reshape(-1, 8)
+        return q_rad, np.broadcast_to(reached & within, shape).reshape(-1, 8)
 
 
 def recognise(dh: DHModel) -> SixAxes | None:
