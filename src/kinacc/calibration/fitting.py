@@ -14,7 +14,6 @@ from kinacc.calibration.frames import (
     Frames,
     closed_form_start,
     frame_terms,
-    inverse_left_jacobians,
     left_jacobians,
     places,
 )
@@ -29,7 +28,7 @@ from kinacc.calibration.least_squares import (
 from kinacc.calibration.observations import Observations
 from kinacc.calibration.uncertainty import TOUCH_SQUARED, scale_of
 from kinacc.errors import input_error
-from kinacc.geometry import Pose, log_so3, skew
+from kinacc.geometry import Pose, inverse_transposed, log_so3, skew
 from kinacc.kinematics.model import ErrorModel
 from kinacc.measurements.folds import configurations
 
@@ -173,7 +172,8 @@ class _View(NamedTuple):
             measured = back @ np.where(turned[:, None, None], part.rotation, np.eye(3))
             angles = log_so3(model @ np.swapaxes(measured, 1, 2)) * turned[:, None]
             residual = np.concatenate([residual, weight * angles.T])
-            turning = weight * inverse_left_jacobians(angles)
+            transposed = left_jacobians(angles).transpose(2, 1, 0)
+            turning = weight * inverse_transposed(transposed).transpose(2, 0, 1)
         there = np.repeat(np.stack([np.ones_like(turned), turned]), 3, axis=0)
         return cls(residual, there[: len(residual)], arm.T, turning, back, reach)
 

@@ -310,20 +310,9 @@ def left_jacobians(w_rad: np.ndarray) -> np.ndarray:
     """Matrices (..., 3, 3) with ``exp(w + dw) = exp(L dw) exp(w)`` to first order."""
     angle = np.linalg.norm(w_rad, axis=-1)[..., None, None]
     cross, large = skew(w_rad), np.maximum(angle, _SMALL_ANGLE_RAD)
-    small = angle < _SMALL_ANGLE_RAD
-    versine = np.where(small, 0.5, (1 - np.cos(large)) / large**2)
-    excess = np.where(small, 1 / 6, (large - np.sin(large)) / large**3)
+    versine = 0.5 * np.sinc(0.5 * angle / np.pi) ** 2
+    excess = np.where(angle < _SMALL_ANGLE_RAD, 1 / 6, (1 - np.sinc(large / np.pi)) / large**2)
     return np.eye(3) + versine * cross + excess * (cross @ cross)
-
-
-def inverse_left_jacobians(w_rad: np.ndarray) -> np.ndarray:
-    """Inverses (n, 3, 3) of ``left_jacobians`` for rotation vectors (n, 3)."""
-    angle = np.linalg.norm(w_rad, axis=1)
-    half = 0.5 * np.maximum(angle, _SMALL_ANGLE_RAD)
-    series = 1 / 12 + angle**2 / 720
-    factor = np.where(angle < _SMALL_ANGLE_RAD, series, (1 - half / np.tan(half)) / (4 * half**2))
-    cross = skew(w_rad)
-    return np.eye(3) - 0.5 * cross + factor[:, None, None] * (cross @ cross)
 
 
 _START_RCOND = 1e-3  # weaker directions of the start are left at zero for the fit to find
