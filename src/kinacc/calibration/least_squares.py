@@ -305,23 +305,21 @@ class Descent:
     least_variance: float = 1e-8
 
     def __post_init__(self) -> None:
-        self.x = np.array(self.start, dtype=float)
         self.truncated = self.threshold is not None
         free = self.system.frames.free
         self.active = np.append(free, np.ones(self.system.free.sum(), dtype=bool))
         self.frames, self.unit = int(free.sum()), self.scale[self.active]
-        with np.errstate(divide="ignore"):
-            self.weight = self.unit / self.prior_std[self.active]  # for unit variance
+        self.weight = self.unit / self.prior_std[self.active]  # for unit variance
         system = self.system
         self.count = float(system.observations.components if self.truncated else system.weight)
         self.variance = 0.0
         self.ranks: tuple[int, int] | None = None
         self.past: list[tuple[np.ndarray, np.ndarray]] = []
-        self.look(self.x)
+        self.look(self.start)
 
     def look(self, x: np.ndarray) -> float:
-        """Normal equations at ``x`` and the objective there."""
-        keep = np.append(self.active, True)
+        """Go to ``x``: normal equations and the objective there."""
+        self.x, keep = x, np.append(self.active, True)
         self.gram = self.system.normal(x, self.scale)[keep][:, keep]
         self.cost = float(self.gram[-1, -1])
         self.displacement = (x - self.nominal)[self.active] / self.unit
@@ -338,10 +336,15 @@ class Descent:
         if self.threshold is None:
             return Split.held(self.gram, weight, self.name)
         least = max(self.threshold if reported else 0.0, FRAME_THRESHOLD)
-        expected = weight if self.variance > 0.0 else self.weight * 0.0
         most = None if reported else self.ranks
         thresholds = least, self.threshold
-        return Split.of(self.gram, self.frames, expected, thresholds, most, reported)
+        return Split.of(self.gram, self.frames, weight, thresholds, most, reported)
+
+    def moved(self, step: np.ndarray) -> np.ndarray:
+        """Parameters (P,) after a step of the scaled active ones."""
+        x = self.x.copy()
+        x[self.active] += self.unit * step
+        return x
 
     def balanced(self, first: bool) -> tuple[Split, np.ndarray]:
         """A step, and the residual variance it leaves, which weighs the priors.
@@ -378,22 +381,19 @@ class Descent:
             if iteration > 2:
                 self.ranks = split.ranks  # a rank that has been lost is not taken back
             if size <= STEP_TOLERANCE and abs(self.variance - settled) <= 1e-9 * settled:
-                self.x[self.active] += self.unit * step
                 to = np.append(step, 1.0)
-                self.cost = float(to @ self.gram @ to)
+                self.x, self.cost = self.moved(step), float(to @ self.gram @ to)
                 return self.solution(iteration, size, True)
             before, here = self.objective, self.x
-            moves = [] if self.truncated else [self.accelerated(step)]
-            for move in (*moves, *(step / 2**halving for halving in range(MAX_HALVINGS))):
-                self.x = here.copy()
-                self.x[self.active] += self.unit * move
-                after = self.look(self.x)
+            moves = [step / 2**halving for halving in range(MAX_HALVINGS)]
+            moves = moves if self.truncated else [self.accelerated(step), *moves]
+            for trial in list(map(self.moved, moves)):
+                after = self.look(trial)
                 if after <= before * (1.0 + growth) + LEAST_COST:
                     break
                 self.past.clear()
             else:
-                self.x, after = here, before
-                self.look(here)
+                after = self.look(here)
             least = max(STANDSTILL * before, NO_CHANGE * self.variance)
             if iteration >= patience and abs(before - after) <= least:
                 return self.solution(iteration, size, not self.truncated)

@@ -46,14 +46,13 @@ _BY_SIGN = {4: (1,), 5: (1, 2), 6: (1, 2, 4), 7: (3, 5)}
 class Table:
     """Joints ``inner`` of an arm, m of its k, and the features they lead to.
 
-    ``joints`` (N, m); ``features`` (N, f); ``slopes`` (N, f, m) per ``unit`` (m,), the spacing of
-    the table; ``reach_mm`` scales lengths; ``tree`` finds the entries nearest to given features.
+    ``joints`` (N, m); ``slopes`` (N, f, m) of the features per ``unit`` (m,), the spacing of the
+    table; ``reach_mm`` scales lengths; ``tree`` holds the features (N, f).
     """
 
     dh: DHModel
     inner: slice
     joints: np.ndarray
-    features: np.ndarray
     slopes: np.ndarray
     unit: np.ndarray
     reach_mm: float
@@ -94,8 +93,7 @@ def _table(columns: bytes) -> Table:
 
     steps = np.diag(1e-5 * unit)
     slopes = np.stack([(features(joints + h) - features(joints - h)) / 2e-5 for h in steps], axis=2)
-    at_joints = features(joints)
-    return Table(model, inner, joints, at_joints, slopes, unit, reach_mm, cKDTree(at_joints))
+    return Table(model, inner, joints, slopes, unit, reach_mm, cKDTree(features(joints)))
 
 
 def search(table: Table, pose: Pose, near_miss_mm: float) -> tuple[np.ndarray, np.ndarray]:
@@ -154,7 +152,7 @@ def repeats(
 def _starts(table: Table, wanted: np.ndarray, begin: int) -> tuple[np.ndarray, np.ndarray]:
     """Poses (m,), counted from ``begin``, and inner joints (m, j) where to start for them."""
     near = table.tree.query(wanted, k=min(_NEAREST, len(table.joints)))[1]
-    slopes, gap = table.slopes[near], wanted[:, None] - table.features[near]
+    slopes, gap = table.slopes[near], wanted[:, None] - table.tree.data[near]
     turned = np.swapaxes(slopes, 2, 3)
     damped = turned @ slopes + 1e-4 * np.eye(slopes.shape[3])
     step = np.linalg.solve(damped, turned @ gap[..., None])
