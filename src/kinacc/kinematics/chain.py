@@ -53,20 +53,24 @@ def across(dh: DHModel, joint: int, frames: Columns, q_rad: np.ndarray) -> Itera
     ``frames`` are those in front of it, ``q_rad`` (n,) its values (mm where it slides).
     """
     slides = dh.prismatic[joint]
-    angle = dh.theta_offset_rad[joint] + (np.zeros(1) if slides else q_rad)
-    s, c = np.sin(angle), np.cos(angle)
     x, y, z, p_mm = frames
-    x, y = c * x + s * y, c * y - s * x
+    x, y = _turned(x, y, dh.theta_offset_rad[joint] + (np.zeros(1) if slides else q_rad))
     p_mm = p_mm + (dh.d_mm[joint] + (q_rad if slides else 0.0)) * z
     yield Columns(x, y, z, p_mm)
     p_mm = p_mm + dh.a_mm[joint] * x
-    s, c = np.sin(dh.alpha_rad[joint]), np.cos(dh.alpha_rad[joint])
-    y, z = c * y + s * z, c * z - s * y
+    y, z = _turned(y, z, dh.alpha_rad[joint])
     yield Columns(x, y, z, p_mm)
     if dh.beta_rad[joint] != 0.0:
-        s, c = np.sin(dh.beta_rad[joint]), np.cos(dh.beta_rad[joint])
-        x, z = c * x - s * z, c * z + s * x
+        z, x = _turned(z, x, dh.beta_rad[joint])
     yield Columns(x, y, z, p_mm)
+
+
+def _turned(
+    one: np.ndarray, other: np.ndarray, angle_rad: np.ndarray | float
+) -> tuple[np.ndarray, np.ndarray]:
+    """Two axes (3, n) turned from the first to the second."""
+    s, c = np.sin(angle_rad), np.cos(angle_rad)
+    return c * one + s * other, c * other - s * one
 
 
 def to_pose(frames: Columns) -> Pose:
