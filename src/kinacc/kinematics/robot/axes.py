@@ -103,28 +103,28 @@ def _row(
     """
     w, facing = (frame.rotation.T @ target.rotation[:, 2 - 2 * i] for i in range(2))
     p = frame.rotation.T @ (target.position_mm - frame.position_mm)
-    sine = np.hypot(w[0], w[1])
-    if sine < nearly_parallel:
-        x, y = (p if last else p - p[2] / w[2] * w)[:2]
-        length = np.hypot(x, y)
-        theta, a = np.arctan2(y, x), length
-        if length < _ON_AXIS_MM:
-            theta, a = np.arctan2(facing[1], facing[0]) if last else 0.0, 0.0
-        elif x < -_TIE * length or (abs(x) <= _TIE * length and y < 0.0):
-            theta, a = np.arctan2(-y, -x), -length
-        u = rotation_z(theta).T @ w
-        beta = np.arctan2(u[0], np.hypot(u[1], u[2]))
-        beta = beta if abs(beta) > _ROUND_OFF_RAD else 0.0
-        return theta, p[2] if last else 0.0, a, np.arctan2(-u[1], u[2]), beta
-    # Direction of the common normal. Of the two senses the one that keeps theta within a quarter
-    # turn, so that an arm drawn in its zero pose has the table people draw up for it.
-    x = np.array([-w[1], w[0], 0.0]) / sine
-    if x[0] < -_TIE or (abs(x[0]) <= _TIE and x[1] < 0.0):
-        x = -x
-    y = np.array([-x[1], x[0], 0.0])
-    alpha = np.arctan2(-(w @ y), w[2])
-    d = p[2] - (p @ y) / -np.sin(alpha) * w[2]
-    return np.arctan2(x[1], x[0]), d, p @ x, alpha, 0.0
+    sine, d = np.hypot(w[0], w[1]), 0.0
+    parallel = sine < nearly_parallel
+    end = p if last or not parallel else p - p[2] / w[2] * w
+    length = np.hypot(end[0], end[1])
+    on_axis = parallel and length < _ON_AXIS_MM
+    if on_axis:
+        x, y = (facing if last else np.eye(3)[0])[:2]
+    else:
+        # Direction of the common normal. Of the two senses the one that keeps theta within a
+        # quarter turn, so that an arm drawn in its zero pose has the table people draw up for it.
+        x, y = end[:2] / length if parallel else np.array([-w[1], w[0]]) / sine
+        if x < -_TIE or (abs(x) <= _TIE and y < 0.0):
+            x, y = -x, -y
+    theta = np.arctan2(y, x)
+    u = rotation_z(theta).T @ w
+    alpha, beta = np.arctan2(-u[1], u[2]), np.arctan2(u[0], np.hypot(u[1], u[2]))
+    if not parallel:
+        d = p[2] - (p[1] * x - p[0] * y) / -np.sin(alpha) * w[2]
+    elif last:
+        d = p[2]
+    a = 0.0 if on_axis else end[0] * x + end[1] * y
+    return theta, d, a, alpha, beta if abs(beta) > _ROUND_OFF_RAD else 0.0
 
 
 def _across(row: tuple[float, ...]) -> Pose:
