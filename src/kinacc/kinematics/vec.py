@@ -22,7 +22,7 @@ from kinacc.kinematics.dh import PARAMETERS, DHModel
 from kinacc.kinematics.model import ErrorModel, JointState
 
 ERRORS = ("delta_x", "delta_y", "delta_z", "eps_x", "eps_y", "eps_z")
-_DIRECTIONS = np.array([-1, 1])
+_DIRECTIONS = {-1: "minus", 1: "plus"}
 
 
 @dataclass(frozen=True)
@@ -70,7 +70,7 @@ class VECModel(ErrorModel):
         """Names (P,) of the coefficients, then of the direction offsets: j1.delta_x.0, ..."""
         joints, orders = range(1, self.joints + 1), range(self.order + 1)
         coefficients = [f"j{i}.{error}.{n}" for i in joints for error in ERRORS for n in orders]
-        offsets = [f"j{i}.eps_z.{direction}" for i in joints for direction in ("minus", "plus")]
+        offsets = [f"j{i}.eps_z.{direction}" for i in joints for direction in _DIRECTIONS.values()]
         return (*coefficients, *offsets)
 
     @property
@@ -162,15 +162,14 @@ class VECModel(ErrorModel):
         """
         table = pd.DataFrame(dict(columns))
         arm = table.groupby("joint").first()
-        error = table["error"].map(ERRORS.index)
-        joint, order, direction = table["joint"] - 1, table["order"], table["direction"]
-        coefficients = np.zeros((len(arm), len(ERRORS), order.max() + 1))
-        offsets = np.zeros((len(arm), 2))
-        both, value = direction == 0, table["coefficient"]
-        coefficients[joint[both], error[both], order[both]] = value[both]
-        offsets[joint[~both], (direction[~both] + 1) // 2] = value[~both]
+        shape = len(arm), len(ERRORS), table["order"].max() + 1
         dh = DHModel(**{name: arm[name] for name in PARAMETERS}, prismatic=nominal.prismatic)
-        return cls(dh, arm["q_min_rad"], arm["q_max_rad"], coefficients, offsets)
+        ends = arm["q_min_rad"], arm["q_max_rad"]
+        empty = cls(dh, *ends, np.zeros(shape), np.zeros((len(arm), 2)))
+        last = table["direction"].map(_DIRECTIONS).fillna(table["order"].astype(str))
+        names = "j" + table["joint"].astype(str) + "." + table["error"] + "." + last
+        values = table["coefficient"].set_axis(names).reindex(empty.names, fill_value=0.0)
+        return empty.with_parameters(values.to_numpy())
 
 
 def without_errors(
@@ -209,7 +208,7 @@ def direction_basis(s: np.ndarray) -> np.ndarray:
     numpy.ndarray
         0 or 1, shape (n, k, 2).
     """
-    return (np.asarray(s)[..., None] == _DIRECTIONS).astype(float)
+    return (np.asarray(s)[..., None] == [*_DIRECTIONS]).astype(float)
 
 
 def pose(model: VECModel, q_rad: np.ndarray, s: np.ndarray | None = None) -> Pose:
