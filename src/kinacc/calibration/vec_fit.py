@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 import scipy
-from scipy.linalg import blas, lapack
+from scipy.linalg import lapack
 
 from kinacc.calibration import fitting
 from kinacc.calibration.fitting import ModelFit, PoseSystem, distinct, once, scales
@@ -346,18 +346,16 @@ def _negative(
     matrix = normal[1:, 1:] * std
     matrix *= std[:, None]
     matrix[np.diag_indices_from(matrix)] += 1.0
-    factor, _ = lapack.dpotrf(matrix.T, clean=0, overwrite_a=1)
+    factor, _ = lapack.dpotrf(matrix.T, overwrite_a=1)
     step = lapack.dpotrs(factor, gradient)[0]
     misfit = max(normal[0, 0] - gradient @ step, np.finfo(float).tiny)
     value = 0.5 * count * np.log(misfit) + np.sum(np.log(np.diag(factor)))
     inverse, _ = lapack.dpotri(factor, overwrite_c=1)
     diagonal, ratio = np.diag(inverse).copy(), count / misfit
-    squares = change @ step**2
+    inverse += np.triu(inverse, 1).T
+    squares, moved = change @ step**2, change * step
     slopes = change @ (1.0 - diagonal) - ratio * squares
-    moved = change * step
-    half = moved @ blas.dtrmm(1.0, inverse, moved.T) * (2.0 * ratio)
-    half += change @ blas.dtrmm(1.0, np.square(inverse, out=inverse), change.T)
-    of_each = diagonal * (1.0 + diagonal) + ratio * step**2 * (1.0 + 2.0 * diagonal)
-    curvature = (change * of_each) @ change.T - half - half.T
-    curvature -= ratio / misfit * np.outer(squares, squares)
+    curvature = (change * (diagonal + ratio * step**2)) @ change.T
+    curvature -= 2.0 * ratio * moved @ inverse @ moved.T
+    curvature -= change @ inverse**2 @ change.T + ratio / misfit * np.outer(squares, squares)
     return float(value), slopes, 2.0 * curvature, np.sqrt(misfit / count)

@@ -178,13 +178,12 @@ def _closed(dh: DHModel, between: np.ndarray, want: Pose) -> np.ndarray:
     """Joints (m, k) of which the first and the last bring the last axis closest to ``want``."""
     q_rad = np.pad(between, ((0, 0), (1, 1)))
     end = _dh.forward(dh.part(slice(-1)), q_rad[:, :-1])
-    # Directions and points of the last axis, turned about z onto the wanted.
+    # Directions and points of the last axis as complex numbers, turned about z onto the wanted.
     mine, goal = (
-        np.stack([1e3 * frame.rotation[:, :2, 2], frame.position_mm[:, :2]], axis=2)
+        np.stack([1e3 * frame.rotation[:, :2, 2], frame.position_mm[:, :2]]) @ [1.0, 1.0j]
         for frame in (end, want)
     )
-    sine = np.sum(mine[:, 0] * goal[:, 1] - mine[:, 1] * goal[:, 0], axis=1)
-    q_rad[:, 0] = np.arctan2(sine, np.sum(mine * goal, axis=(1, 2)))
+    q_rad[:, 0] = np.angle(np.sum(mine.conj() * goal, axis=0))
     axes = np.swapaxes(rotation_z(q_rad[:, 0]) @ end.rotation, 1, 2) @ want.rotation
     sine, cosine = axes[:, 1, 0] - axes[:, 0, 1], axes[:, 0, 0] + axes[:, 1, 1]
     q_rad[:, -1] = np.arctan2(sine, cosine) - dh.theta_offset_rad[-1]
