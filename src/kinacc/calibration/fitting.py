@@ -81,7 +81,7 @@ class PoseSystem:
         """All residuals (m,), observation by observation."""
         known = FrameParameters.none(self.frames.frames(x[: self.frames.size]))
         still = np.zeros_like(self.free)
-        system = replace(self, model=self._model(x), free=still, frames=known)
+        system = replace(self, model=self.arm(x), free=still, frames=known)
         return np.concatenate([residual for residual, _ in system.blocks(x[:0])])
 
     def blocks(self, x: np.ndarray) -> Iterator[tuple[np.ndarray, np.ndarray]]:
@@ -103,7 +103,7 @@ class PoseSystem:
 
         c = 3, or 6 in a block with orientations.
         """
-        size, model = self.frames.size, self._model(x)
+        size, model = self.frames.size, self.arm(x)
         frames = self.frames.frames(x[:size])
         root = np.ones(len(self.observations)) if self.root is None else self.root
         for begin in range(0, len(root), BLOCK_ROWS):
@@ -138,7 +138,8 @@ class PoseSystem:
             columns *= root[rows] * view.measured
             yield columns, view.measured
 
-    def _model(self, x: np.ndarray) -> ErrorModel:
+    def arm(self, x: np.ndarray) -> ErrorModel:
+        """The model with the parameters of ``x`` (P,)."""
         vector = self.model.start.copy()
         vector[self.free] = x[self.frames.size :]
         return self.model.with_parameters(vector)
@@ -345,7 +346,6 @@ def fit(
         allowed = "at least as many components as parameters"
         raise input_error("measurements", what, allowed, "measure more poses")
     parameters = placed(observations, nominal, frames, weight, begin)
-    place = parameters.size
     system = PoseSystem(observations, nominal, mask, parameters, weight)
     frame_std, least_variance = parameters.std, 1e-8
     if held:
@@ -365,10 +365,8 @@ def fit(
         least_variance,
     )
     solution, weights = minimise_robust(descent, loss)
-    vector = nominal.start.copy()
-    vector[mask] = solution.x[place:]
-    model, placed_at = nominal.with_parameters(vector), parameters.frames(solution.x[:place])
-    return ModelFit(model, placed_at, free, std, solution, parameters, weights)
+    model, frames_there = system.arm(solution.x), parameters.frames(solution.x[: parameters.size])
+    return ModelFit(model, frames_there, free, std, solution, parameters, weights)
 
 
 def scales(model: ErrorModel) -> np.ndarray:
