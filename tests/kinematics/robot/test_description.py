@@ -165,7 +165,7 @@ def test_all_faults_are_listed_in_order_with_line_and_key(arm):
         ("d_mm: 290", "d_mm: 1e90", ":5, dh[0].d_mm"),
         ("limits_deg: [-165, 165]", "beta_deg: 0", "joint 1: its limits"),
         ("joint: prismatic", "joint: linear", ":7, dh[2].joint"),
-        ("joint: prismatic, ", "", ":7, dh[2]"),
+        ("joint: prismatic, ", "", "joint 3: its limits"),
         ("source:", "convention: craig\nsource:", ":2, convention"),
         ("source:", "joint_map: [[1, 0], [0, 1]]\nsource:", "sign"),
         ("source:", "tool: {x_mm: 3}\nsource:", ":2, tool.x_mm"),
@@ -194,8 +194,8 @@ def test_units_that_only_make_sense_in_another_are_noticed(arm):
 
 def test_too_few_and_too_many_joints_are_refused(arm):
     last = GOOD.splitlines()[-1] + "\n"
-    assert "dh: has 8 rows; 4 to 7" in faults(arm, GOOD + 4 * last)
-    assert "dh: has 3 rows; 4 to 7" in faults(arm, GOOD.removesuffix(last))
+    assert "at most 7 items after validation, not 8" in faults(arm, GOOD + 4 * last)
+    assert "at least 4 items after validation, not 3" in faults(arm, GOOD.removesuffix(last))
 
 
 def test_joints_beyond_their_limits_are_given_by_joint_and_row():

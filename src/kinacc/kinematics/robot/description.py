@@ -137,13 +137,6 @@ class Row(_Strict):
     limits_rad: TurnLimits | None = None
     limits_mm: Limits | None = None
 
-    @model_validator(mode="after")
-    def _limits_of_its_kind(self) -> Self:
-        if (self.limits_rad if self.joint == "prismatic" else self.limits_mm) is not None:
-            units = "mm or m" if self.joint == "prismatic" else "deg or rad"
-            raise refused(f"the joint is {self.joint}", f"give its limits in {units}")
-        return self
-
 
 class _About(_Strict):
     name: Text = ""
@@ -170,17 +163,11 @@ class _About(_Strict):
         return np.array(self.joint_map)
 
 
-def _of_an_arm(rows: list[Row]) -> list[Row]:
-    if not FEWEST_JOINTS <= len(rows) <= MOST_JOINTS:
-        raise refused(f"has {len(rows)} rows", f"{FEWEST_JOINTS} to {MOST_JOINTS}, one per joint")
-    return rows
-
-
 class Table(_About):
     """A robot file with a table of DH rows."""
 
     convention: Literal["standard", "modified"] = "standard"
-    dh: Annotated[list[Row], AfterValidator(_of_an_arm)]
+    dh: list[Row] = Field(min_length=FEWEST_JOINTS, max_length=MOST_JOINTS)
     limits_rad: list[TurnLimits] | None = None
     base: Frame = Frame()
     flange: Frame = Frame()
