@@ -18,8 +18,9 @@ from kinacc.calibration.observations import Observations
 from kinacc.calibration.uncertainty import (
     TOUCH_SQUARED,
     Uncertainty,
-    is_angle,
     named_directions,
+    scale_of,
+    scaled_unit,
     unit_of,
 )
 from kinacc.kinematics.dh import PARAMETERS, DHModel
@@ -88,8 +89,7 @@ class LeftOpen:
             first = sorted(parts[:_MOST_NAMES], key=lambda i: (not arm[i], i))
             turned = turned * np.sign(turned[first[0]])
             shown = [
-                f"{parameter_name(self.names[i])} {turned[i]:+.2g} "
-                f"{'mrad' if is_angle(self.names[i]) else 'mm'}"
+                f"{parameter_name(self.names[i])} {turned[i]:+.2g} {scaled_unit(self.names[i])}"
                 for i in first
             ]
             more = [f"{len(parts) - _MOST_NAMES} more"] if len(parts) > _MOST_NAMES else []
@@ -239,8 +239,8 @@ def identified(fit: ModelFit, known: Uncertainty, observations: Observations) ->
         status = IDENTIFIED if estimated[i] else FIXED
         statement = None if estimated[i] else "fixed by calibration.frames"
         if np.isfinite(prior[i]) and std[i] > LEANS * prior[i]:
-            size, unit = (1e3, "mrad") if is_angle(name) else (1.0, "mm")
-            status, statement = PRIOR, f"known beforehand to {size * prior[i]:g} {unit}"
+            size = f"{prior[i] / scale_of(name):g} {scaled_unit(name)}"
+            status, statement = PRIOR, f"known beforehand to {size}"
         if part[i] ** 2 > (MOVES_SQUARED if status == PRIOR else TOUCH_SQUARED):
             status, statement = UNDETERMINED, why[i] or None
         deviation = std[i] if status in (IDENTIFIED, PRIOR) else None
