@@ -152,20 +152,17 @@ def frame_terms(
     further = (f"{BASE}{number}" for number in range(2, stated.sessions + 1))
     owners = [BASE, *further, *observations.target_names]
     about = [(MOTIONS[j], None, owners[i]) for i, j in zip(frame, axis, strict=True)]
-    frames = {owner: [item[0] for item in about if item[2] == owner] for owner in owners}
+    names = tuple(f"{owner}.{component}" for component, _, owner in about)
+    estimated = {*owners, *names}
+    keys = ", ".join(name.rpartition("_")[0] for name in names)
     refuse(
-        Problem(
-            f"{parameter_rules.FRAMES}, {rule.name!r}",
-            f"{rule.parameter or rule.frame} is not estimated",
-            ", ".join(frames.get(rule.frame or "", frames)),
-        )
+        Problem(f"{parameter_rules.FRAMES}, {rule.name!r}", "is not estimated", keys)
         for rule in rules
-        if rule.frame not in frames or rule.parameter not in (None, *frames[rule.frame])
+        if ".".join(filter(None, (rule.frame, rule.parameter))) not in estimated
     )
     position = stated.poses.position_mm
     begin = np.hstack([position, np.zeros_like(position)])[frame, axis]
     free, value, std = ruled(rules, about, np.ones(len(begin), dtype=bool), begin)
-    names = tuple(f"{owner}.{component}" for component, _, owner in about)
     hidden = np.zeros((0, len(names)))
     return FrameParameters(names, (frame, axis), stated, value, free, value, std, hidden)
 
