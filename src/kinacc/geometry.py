@@ -142,14 +142,9 @@ def rotation_z(angle_rad: np.ndarray | float) -> np.ndarray:
 
 
 def _axis_rotation(angle_rad: np.ndarray | float, axis: int) -> np.ndarray:
-    angle_rad = np.asarray(angle_rad, dtype=float)
-    after, last = (axis + 1) % 3, (axis + 2) % 3
-    matrix = np.zeros((*angle_rad.shape, 3, 3))
-    matrix[..., axis, axis] = 1.0
-    matrix[..., after, after] = matrix[..., last, last] = np.cos(angle_rad)
-    matrix[..., last, after] = np.sin(angle_rad)
-    matrix[..., after, last] = -matrix[..., last, after]
-    return matrix
+    angle = np.asarray(angle_rad, dtype=float)[..., None, None]
+    along = np.diag(np.eye(3)[axis])
+    return along + np.cos(angle) * (np.eye(3) - along) + np.sin(angle) * _CROSS[axis]
 
 
 def exp_so3(rotation_vector_rad: np.ndarray) -> np.ndarray:
