@@ -420,6 +420,12 @@ class Descent:
         """What the latest normal equations say of the parameters."""
         fitted, reported = self.split(), self.split(reported=True)
         system, frames, active = self.system, self.system.frames, self.active
+
+        def everywhere(part: np.ndarray) -> np.ndarray:
+            whole = np.zeros((active.size, part.shape[1]))
+            whole[active] = part
+            return whole
+
         freedom, spectrum = self.count - fitted.effective, None
         variance = self.cost / freedom if freedom > 0 else np.nan
         variance = variance if self.truncated else self.variance
@@ -435,18 +441,13 @@ class Descent:
                     residual, jacobian, shared_errors(system.observations),
                     fitted.root, reported.root, variance,
                 )  # fmt: skip
-        covariance = np.zeros((active.size, active.size))
-        root = self.unit[:, None] * reported.root
-        covariance[np.ix_(active, active)] = root @ along @ root.T
-        hidden = np.zeros((len(frames.hidden), active.size))
-        hidden[:, : frames.size] = frames.hidden
-        lost = np.zeros((reported.lost.shape[1], active.size))
-        lost[:, active] = reported.lost.T
-        touched = np.sum(hidden**2, axis=0)
-        touched[active] += np.sum(reported.anchor**2, axis=1)
+        root = everywhere(self.unit[:, None] * reported.root)
+        covariance = root @ along @ root.T
+        hidden = np.pad(frames.hidden, ((0, 0), (0, active.size - frames.size)))
+        touched = np.sum(hidden**2, axis=0) + np.sum(everywhere(reported.anchor) ** 2, axis=1)
         std = np.sqrt(np.maximum(np.diag(covariance), 0.0))
         std[(touched > TOUCH_SQUARED) | ~active] = np.nan
         return Solution(
             self.x, std, covariance, self.cost, self.count, freedom, variance, iterations, size,
-            converged, spectrum, np.concatenate([lost, hidden]), self.scale,
+            converged, spectrum, np.concatenate([everywhere(reported.lost).T, hidden]), self.scale,
         )  # fmt: skip

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections import Counter
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from lxml import etree
@@ -196,9 +195,9 @@ def _root(path: Path) -> etree._Element:
         root = etree.fromstring(text, parser)
     except etree.XMLSyntaxError as error:
         raise input_error(f"{place}:{error.lineno or 1}", f"is not XML: {error.msg}") from None
-    definitions: Any = root.getroottree().docinfo.internalDTD
-    if definitions is not None and any(True for _ in definitions.iterentities()):
-        raise input_error(place, "defines entities", "plain URDF")
+    if root.getroottree().docinfo.doctype:
+        fault = "has a document type, which may define entities"
+        raise input_error(place, fault, "plain URDF")
     if root.tag != "robot" or not root.get("name"):
         raise input_error(place, "is no <robot name=..>", "a URDF file")
     if any("xacro" in str(element.tag) for element in root.iter("{*}*")):
