@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from kinacc.errors import InputError, Problem
+from kinacc.errors import input_error
 from kinacc.geometry import Pose, compose, invert
 from kinacc.kinematics import dh as _dh
 from kinacc.kinematics.inverse import closed_form, limits, newton, postures
@@ -183,8 +183,7 @@ def solve(
     names = known if branches is None else tuple(branches)
     for name in names:
         if name not in known:
-            problem = Problem(f"robot {robot.name}", f"has no branch {name}", ", ".join(known))
-            raise InputError(problem)
+            raise input_error(f"robot {robot.name}", f"has no branch {name}", ", ".join(known))
     columns = [known.index(name) for name in names]
     like = None if travel is None else JointState(np.zeros((1, model.joints)), travel[None])
     onto = _Onto(robot, model, like, fitted_range_rad)

@@ -207,15 +207,9 @@ def names_of(dh: DHModel) -> tuple[str, ...]:
     """Names of the postures of an arm, before they are numbered."""
     if dh.joints == 6 and not dh.prismatic.any():
         return BRANCHES
-    names = [
-        " ".join(
-            f"q{joint + 1}{sign}" for joint, sign in zip(_BY_SIGN[dh.joints], signs, strict=True)
-        )
-        for signs in product("+-", repeat=len(_BY_SIGN[dh.joints]))
-    ]
-    if dh.joints == 7:
-        names = [f"{half} {name}" for half in ("fore", "aft") for name in names]
-    return tuple(names)
+    sides = [(f"q{joint + 1}+", f"q{joint + 1}-") for joint in _BY_SIGN[dh.joints]]
+    halves = [("fore", "aft")] if dh.joints == 7 else []
+    return tuple(map(" ".join, product(*halves, *sides)))
 
 
 def classes_of(dh: DHModel, q_rad: np.ndarray) -> np.ndarray:
