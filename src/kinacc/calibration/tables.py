@@ -112,5 +112,5 @@ def covariance_columns(uncertainty: Uncertainty) -> Columns:
         "parameter": names[first],
         "other": names[second],
         "covariance": covariance,
-        "correlation": np.where(np.isfinite(correlation), correlation, np.nan),
+        "correlation": correlation,
     }

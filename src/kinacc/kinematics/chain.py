@@ -101,12 +101,10 @@ class Walk:
         self.stretch: Any = None  # an array where there are errors
         if errors is not None:
             self.pose = Pose(project_so3(self.pose.rotation), self.pose.position_mm)
-            rotation = np.ascontiguousarray(self.pose.rotation.transpose(1, 2, 0))
-            raw = np.stack(here[:3], axis=1)
             # raw = P Q, P symmetric; a small turn w of Q: (tr(P) - P) w = skew part of d(raw) Q'.
-            self.stretch = np.einsum("ikn,jkn->ijn", raw, rotation)
-            trace = self.stretch[0, 0] + self.stretch[1, 1] + self.stretch[2, 2]
-            self.rate = inverse_transposed(trace * np.eye(3)[..., None] - self.stretch)
+            self.stretch = np.einsum("kin,njk->ijn", np.stack(here[:3]), self.pose.rotation)
+            trace = np.trace(self.stretch) * np.eye(3)[..., None]
+            self.rate = inverse_transposed(trace - self.stretch)
 
     def shift(self, frames: Columns, axis: int, into: np.ndarray) -> None:
         """Motion (6, n) of the flange per mm along an axis of ``frames``."""
