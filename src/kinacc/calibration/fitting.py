@@ -445,26 +445,19 @@ def placed(
     gram = system.normal(coordinates.begin, coordinates.scale)[:-1, :-1]
     values, vectors = np.linalg.eigh(gram[np.ix_(keep, keep)])
     hidden = vectors[:, values <= SHOWN**2 * max(values[-1:], default=0.0)].T
-    hidden = _without_known(hidden, np.isfinite(coordinates.std[keep]))
+    # Mixtures of which no prior speaks.
+    _, known, turn = np.linalg.svd(hidden[:, np.isfinite(coordinates.std[keep])].T)
+    hidden = turn[int(np.sum(known**2 > TOUCH_SQUARED)) :] @ hidden
     if not len(hidden):
         return coordinates
-    of_base = coordinates.places[0] < start.sessions
-    held = keep[_pivots(hidden, (~of_base & ~coordinates.angle)[keep])]
-    free, begin = coordinates.free.copy(), coordinates.begin.copy()
+    of_target = (coordinates.places[0] >= start.sessions) & ~coordinates.angle
+    held = keep[_pivots(hidden, of_target[keep])]
+    free = coordinates.free.copy()
     free[held] = False
-    placed = held[~of_base[held] & ~coordinates.angle[held]]
-    begin[placed] = terms.begin[placed]
+    begin = np.where(of_target & ~free & coordinates.free, terms.begin, coordinates.begin)
     motions = np.zeros((len(hidden), coordinates.size))
     motions[:, keep] = hidden
     return replace(coordinates, free=free, begin=begin, hidden=motions)
-
-
-def _without_known(hidden: np.ndarray, known: np.ndarray) -> np.ndarray:
-    """Mixtures of directions ``hidden`` (m, F) that no prior on components ``known`` speaks of."""
-    if not len(hidden) or not known.any():
-        return hidden
-    _, values, turn = np.linalg.svd(hidden[:, known].T)
-    return turn[int(np.sum(values**2 > TOUCH_SQUARED)) :] @ hidden
 
 
 def _pivots(motions: np.ndarray, preferred: np.ndarray) -> np.ndarray:

@@ -20,7 +20,7 @@ _SINGULAR = 1e-9  # share of the largest singular value
 
 
 def refine(
-    model: ErrorModel, target: Pose, carried: Pose, q: np.ndarray, like: JointState | None = None
+    model: ErrorModel, target: Pose, carried: Pose, q: np.ndarray, like: JointState
 ) -> np.ndarray:
     """Joints of an arm of four or five axes that put a point where it is wanted.
 
@@ -37,7 +37,7 @@ def refine(
         The tool in the last DH frame, mm.
     q : numpy.ndarray
         DH joints to start from, shape (n, k), rad (mm where a joint slides).
-    like : JointState, optional
+    like : JointState
         States whose travel directions and payload the arm has: of every pose, or one for all.
 
     Returns
@@ -47,13 +47,12 @@ def refine(
     """
     unit = np.where(model.dh.prismatic, _MM_PER_UNIT, 1.0)
     q = np.array(q, dtype=float)
-    active, state = np.arange(len(q)), JointState(q) if like is None else like.moved(q)
+    active, state = np.arange(len(q)), like.moved(q)
     for _ in range(_MOST_STEPS):
         at = state.select(active).moved(q[active])
         end = model.pose(at)
         arm = (end.rotation @ carried.position_mm[:, None])[..., 0]
-        goal = Pose(target.rotation[active], target.position_mm[active])
-        error = pose_error(goal, compose(end, carried))
+        error = pose_error(target.select(active), compose(end, carried))
         slopes = model.joint_jacobian(at)
         # A turn of the last frame swings the point: w x arm = -[arm] w.
         moves = (slopes[:, :3] - skew(arm) @ slopes[:, 3:]) * unit
