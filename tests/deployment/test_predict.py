@@ -7,7 +7,7 @@ import pytest
 from pose_checks import movement
 from small_arms import BASE, calibrated, joints, moved
 
-from kinacc.calibration.uncertainty import is_angle
+from kinacc.calibration.uncertainty import unit_of
 from kinacc.deployment.applicability import sensitivity
 from kinacc.deployment.predict import predict
 from kinacc.kinematics import robot
@@ -31,7 +31,7 @@ def test_slopes_are_the_finite_differences_of_the_pose(model, frame, point):
         name = names[column]
         found = slope(
             lambda step, name=name: moved(arm, {name: step}).pose(state, frame, point),
-            1e-6 if is_angle(name) else 1e-3,
+            1e-6 if unit_of(name) == "rad" else 1e-3,
         )
         np.testing.assert_allclose(slopes[:, :3, column], found[:, :3], rtol=1e-5, atol=2e-4)
         np.testing.assert_allclose(slopes[:, 3:, column], found[:, 3:], rtol=1e-5, atol=1e-8)

@@ -137,10 +137,9 @@ def _cut(
     rank = _rank(np.sqrt(np.maximum(values[::-1], 0.0)), threshold, most)
     directions, lost = np.split(vectors[:, ::-1], [rank], axis=1)
     for derivative, least in known:
-        if len(derivative) and lost.size:
-            _, change, turn = np.linalg.svd(derivative @ lost)
-            back, lost = np.split(lost @ turn.T, [int(np.sum(change**2 > least))], axis=1)
-            directions = np.concatenate([directions, back], axis=1)
+        _, change, turn = np.linalg.svd(derivative @ lost)
+        back, lost = np.split(lost @ turn.T, [int(np.sum(change**2 > least))], axis=1)
+        directions = np.concatenate([directions, back], axis=1)
     return directions, lost, rank
 
 

@@ -69,8 +69,8 @@ def fit_model(
     every, train = observed(inputs, arm)
     estimator = estimators(settings["calibration"], arm, every)[kind]
     choices = estimator.choices(every)
-    held_out = np.unique(every.fold[~train])
-    estimator = estimator.chosen(choices, int(held_out[0]) if len(held_out) else None)
+    held_out = sorted({*every.fold[~train].tolist()})
+    estimator = estimator.chosen(choices, next(iter(held_out), None))
     observations = every.select(train)
     fitted = estimator.fit(observations, delivered_fits(inputs, arm, every))
     names, known = (every.target_names, every.session_names), uncertainty.of_fit(fitted)

@@ -141,22 +141,6 @@ def scaled_unit(name: str) -> str:
     return {"mm": unit, "rad": "mrad"}.get(unit, f"1e-6 {unit}")
 
 
-def is_angle(name: str) -> bool:
-    """Whether a parameter is in rad.
-
-    Parameters
-    ----------
-    name : str
-        As ``j1.theta_rad``.
-
-    Returns
-    -------
-    bool
-        True for rad.
-    """
-    return unit_of(name) == "rad"
-
-
 WORST_CONDITION = 1e6  # of the equations for variances: beyond it they cannot be told apart
 LEAST_FREEDOM = 1e-12  # in residuals
 

@@ -16,7 +16,7 @@ from kinacc.calibration.identifiability import (
 )
 from kinacc.calibration.misfit import in_words, misfit, misfits
 from kinacc.calibration.residuals import STANDARD_ERRORS
-from kinacc.calibration.uncertainty import is_angle
+from kinacc.calibration.uncertainty import scale_of, scaled_unit, unit_of
 from kinacc.config.error_models import MEASURED, NOMINAL, PLAINEST, Comparison, model_name
 from kinacc.deployment.folder import uncertainty
 from kinacc.figures.calibration import draw_joint_errors
@@ -112,8 +112,8 @@ def identifiability(tables: Tables, robot: Robot, summary: CalibrationSummary) -
     pairs = pd.DataFrame(tables["dh_covariance"])
     pairs = pairs[pairs["parameter"] != pairs["other"]].dropna(subset="correlation")
     pairs = pairs.sort_values("correlation", key=abs, ascending=False, kind="stable")
-    table["unit"] = np.where(table["parameter"].map(is_angle), "mrad", "mm")
-    table["std"] *= np.where(table["unit"] == "mrad", 1e3, 1.0)
+    table["unit"] = table["parameter"].map(scaled_unit)
+    table["std"] /= table["parameter"].map(scale_of)
     table["called"] = table["parameter"].map(parameter_name)
     table["statement"] = table["statement"].fillna("")
     for column in ("parameter", "other"):
@@ -169,7 +169,7 @@ def dh_parameters(model: Columns, identified: Columns, robot: Robot) -> pd.DataF
     table["called"] = table["parameter"].map(parameter_name)
     is_zero = (table[["nominal", "calibrated"]] == 0.0).all(axis=1)
     unused = table["parameter"].str.endswith("beta_rad") & (table["status"] == FIXED) & is_zero
-    angle = table["parameter"].map(is_angle)
+    angle = table["parameter"].map(unit_of) == "rad"
     scale = np.where(angle, 1e3, 1.0)
     table["difference"] = (table["calibrated"] - table["nominal"]) * scale
     table["std"] *= scale

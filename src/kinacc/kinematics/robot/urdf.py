@@ -195,7 +195,7 @@ def _root(path: Path) -> etree._Element:
         root = etree.fromstring(text, parser)
     except etree.XMLSyntaxError as error:
         raise input_error(f"{place}:{error.lineno or 1}", f"is not XML: {error.msg}") from None
-    if root.getroottree().docinfo.doctype:
+    if root.getroottree().docinfo.internalDTD is not None:
         fault = "has a document type, which may define entities"
         raise input_error(place, fault, "plain URDF")
     if root.tag != "robot" or not root.get("name"):
