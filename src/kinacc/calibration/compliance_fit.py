@@ -58,12 +58,10 @@ class ComplianceEstimator(Estimator):
     ) -> Iterator[tuple[tuple[str, ...], str, str]]:
         """Joints the arm has not or that slide, links of another arm, no direction of gravity."""
         section, joints = calibration["compliance"], arm.dh.joints
-        turning = 1 + np.flatnonzero(~np.asarray(arm.dh.prismatic))
-        for joint in section["joints"]:
-            if joint > joints:
-                yield ("joints",), f"{arm.name} has no joint {joint}", f"1 to {joints}"
-            elif joint not in turning:
-                yield ("joints",), f"joint {joint} of {arm.name} slides", "joints that turn"
+        turning = (1 + np.flatnonzero(~arm.dh.prismatic)).tolist()
+        for joint in {*section["joints"]} - {*turning}:
+            what = f"{arm.name} has no joint {joint} that turns"
+            yield ("joints",), what, ", ".join(map(str, turning))
         if section["links"] and len(section["links"]) != joints:
             what = f"{len(section['links'])} links for the {joints} joints of {arm.name}"
             yield ("links",), what, "one for each joint, or none"
