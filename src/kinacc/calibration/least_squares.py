@@ -339,9 +339,9 @@ class Descent:
         thresholds = least, self.threshold
         return Split.of(self.gram, self.frames, weight, thresholds, most, reported)
 
-    def moved(self, step: np.ndarray) -> np.ndarray:
-        """Parameters (P,) after a step of the scaled active ones."""
-        x = self.x.copy()
+    def moved(self, x: np.ndarray, step: np.ndarray) -> np.ndarray:
+        """Parameters ``x`` (P,) after a step of the scaled active ones."""
+        x = x.copy()
         x[self.active] += self.unit * step
         return x
 
@@ -381,13 +381,13 @@ class Descent:
                 self.ranks = split.ranks  # a rank that has been lost is not taken back
             if size <= STEP_TOLERANCE and abs(self.variance - settled) <= 1e-9 * settled:
                 to = np.append(step, 1.0)
-                self.x, self.cost = self.moved(step), float(to @ self.gram @ to)
+                self.x, self.cost = self.moved(self.x, step), float(to @ self.gram @ to)
                 return self.solution(iteration, size, True)
             before, here = self.objective, self.x
             moves = [step / 2**halving for halving in range(MAX_HALVINGS)]
             moves = moves if self.truncated else [self.accelerated(step), *moves]
-            for trial in list(map(self.moved, moves)):
-                after = self.look(trial)
+            for move in moves:
+                after = self.look(self.moved(here, move))
                 if after <= before * (1.0 + growth) + LEAST_COST:
                     break
                 self.past.clear()
