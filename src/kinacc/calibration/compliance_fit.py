@@ -93,7 +93,7 @@ def _load_changes(every: Observations, payload: np.ndarray) -> bool:
     """Whether rows carry different payloads, where those that say nothing carry ``payload``."""
     carried = np.where(np.isnan(every.payload), payload, every.payload)
     loads = carried[:, :1] * np.column_stack([np.ones(len(carried)), carried[:, 1:]])
-    return bool(np.ptp(loads, axis=0).any()) if len(loads) else False
+    return len(np.unique(loads, axis=0)) > 1
 
 
 def _scales(nominal: ComplianceModel, observations: Observations) -> np.ndarray:

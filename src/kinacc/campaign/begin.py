@@ -24,7 +24,7 @@ from kinacc.deployment.planning import shortest_path
 from kinacc.deployment.record import Calibration
 from kinacc.errors import Problem, first_few, input_error, refuse
 from kinacc.geometry import compose, invert
-from kinacc.kinematics.inverse.limits import outside, travel_unit
+from kinacc.kinematics.inverse.limits import outside
 from kinacc.kinematics.model import JointState
 
 _MUCH_NOISE = 2.0  # times what the calibration left unexplained, noise included
@@ -149,7 +149,7 @@ def plan_of(
     begun = assessor.begin(Candidates(noise[order]))
     route = order[: begun.first]
     count = begun.reference_poses
-    places = points.joints[route] / travel_unit(arm.robot)
+    places = points.joints[route] / arm.robot.dh.travel_unit
     here = np.zeros(places.shape[1])
     first = _short_path(places[:count], here)
     here = places[first[-1]] if count else here

@@ -174,7 +174,7 @@ def _drawn(options: Options, arm: Calibration, count: int) -> np.ndarray:
             # Coupled joints have no box of their own.
             joints = joints[~arm.outside_range(robot.dh_joints(joints)).any(axis=1)]
         else:
-            joints = between(poses, ends.travel_unit(robot), times * count, options["seed"])
+            joints = between(poses, robot.dh.travel_unit, times * count, options["seed"])
             joints = joints[ends.within(joints, robot.q_min_rad, robot.q_max_rad)]
             if inside is not None:
                 joints = joints[inside(tool_positions(robot, joints, target))]

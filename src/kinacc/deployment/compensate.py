@@ -172,7 +172,7 @@ class _Goals:
         """
         calibration, robot, model = self.calibration, self.calibration.robot, self.calibration.model
         is_bounded, within = model.domain is not None, (robot.q_min_rad, robot.q_max_rad)
-        reach = limits.travel_unit(robot) * SAME_POSTURE_RAD
+        reach = robot.dh.travel_unit * SAME_POSTURE_RAD
         far = limits.outside(limits.reported_joints(robot, start), within, reach)
         if is_bounded:
             far |= calibration.outside_range(start, reach)
@@ -198,7 +198,7 @@ class _Goals:
             [PoseStatus.NOT_REACHED, PoseStatus.OUTSIDE_LIMITS, PoseStatus.CONVERGED],
             PoseStatus.OUTSIDE_RANGE if is_bounded else PoseStatus.EXTRAPOLATED,
         )
-        apart = np.abs(reported - self.near[rows]) / limits.travel_unit(robot)
+        apart = np.abs(reported - self.near[rows]) / robot.dh.travel_unit
         table = pd.DataFrame(q_dh).assign(row=rows, status=status, off_mm=off, angle_rad=angle)
         return table.assign(movement=np.max(apart, axis=1))
 

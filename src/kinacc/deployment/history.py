@@ -221,7 +221,7 @@ def _errors_mm(force: Session, session: Session, moved: Set[str], weight: float)
     if not {*observed.target_names} <= {*calibration.targets}:
         moved = {*moved, TOOL}
     frames = frames_at(calibration, observed, moved, weight)
-    return np.linalg.norm(errors_of(calibration, frames, observed).position_mm, axis=1)
+    return np.linalg.norm(errors_of(calibration, frames, observed)[:, :3], axis=1)
 
 
 def _thinned(observations: Observations) -> Observations:

@@ -24,7 +24,7 @@ from kinacc.errors import Problem, input_error, refuse, require_type
 from kinacc.geometry import Pose, compose
 from kinacc.kinematics import dh
 from kinacc.kinematics.dh import DHModel
-from kinacc.kinematics.inverse.limits import outside, travel_unit
+from kinacc.kinematics.inverse.limits import outside
 from kinacc.kinematics.region import points
 from kinacc.kinematics.robot import Robot
 
@@ -140,7 +140,7 @@ def plan_poses(
         raise input_error("candidates", "determine no parameter")
     chosen, index = choose(shown.rows, count)
     chosen = np.sort(chosen)
-    places = np.concatenate([start_rad, q_rad[chosen]]) / travel_unit(robot)
+    places = np.concatenate([start_rad, q_rad[chosen]]) / robot.dh.travel_unit
     distance, path = distances(places), shortest_path(places)
     return PosePlan(
         chosen[path[1:] - 1],

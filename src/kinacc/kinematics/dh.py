@@ -78,6 +78,11 @@ class DHModel(ErrorModel):
         return self.theta_offset_rad.size
 
     @property
+    def travel_unit(self) -> np.ndarray:
+        """Movement (k,) of each joint that counts as a radian: 1 rad, 1000 mm where it slides."""
+        return np.where(self.prismatic, 1000.0, 1.0)
+
+    @property
     def dh(self) -> Self:
         """The model itself: it has no errors but those in its parameters."""
         return self

@@ -266,7 +266,7 @@ def _beside(dh: _dh.DHModel, q_rad: np.ndarray, first: int) -> tuple[np.ndarray,
     The nominal arm may have one posture, or none, where the model has two. Starts lie along the
     direction of joints, from ``first`` on, that moves the flange least.
     """
-    unit = np.where(dh.prismatic, 1e3, 1.0)
+    unit = dh.travel_unit
     slopes = dh.joint_jacobian(JointState(q_rad)) * np.repeat([1.0, 1e3], 3)[:, None] * unit
     _, sizes, directions = np.linalg.svd(slopes[..., first:], full_matrices=False)
     weak = np.flatnonzero(sizes[:, -1] < _WEAK_MM)

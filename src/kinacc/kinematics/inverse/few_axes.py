@@ -13,7 +13,6 @@ from kinacc.kinematics.inverse.newton import pose_error
 from kinacc.kinematics.model import ErrorModel, JointState
 
 SIX = 6  # axes that take any orientation
-_MM_PER_UNIT = 1000.0  # travel of a sliding joint that counts as a radian
 _MOST_STEPS = 60
 _LONGEST_STEP, _SMALLEST_STEP = 0.5, 1e-12
 _SINGULAR = 1e-9  # share of the largest singular value
@@ -45,7 +44,7 @@ def refine(
     numpy.ndarray
         DH joints, shape (n, k). Whether a point was reached shows in its pose.
     """
-    unit = np.where(model.dh.prismatic, _MM_PER_UNIT, 1.0)
+    unit = model.dh.travel_unit
     q = np.array(q, dtype=float)
     active, state = np.arange(len(q)), like.moved(q)
     for _ in range(_MOST_STEPS):

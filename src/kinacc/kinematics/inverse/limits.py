@@ -33,22 +33,6 @@ def reported_joints(robot: Robot, q_rad: np.ndarray) -> np.ndarray:
     return q_rad @ np.linalg.inv(robot.joint_map).T
 
 
-def travel_unit(robot: Robot) -> np.ndarray:
-    """Movement of each joint that counts as a radian.
-
-    Parameters
-    ----------
-    robot : Robot
-        Arm of k joints.
-
-    Returns
-    -------
-    numpy.ndarray
-        1 rad, or 1000 mm where a joint slides, shape (k,).
-    """
-    return np.where(robot.dh.prismatic, 1000.0, 1.0)
-
-
 def dh_limits(robot: Robot) -> tuple[np.ndarray, np.ndarray]:
     """Limits of the DH joints.
 

@@ -17,7 +17,7 @@ from kinacc.kinematics.model import ErrorModel, JointState
 POSITION_TOLERANCE_MM = 1e-6
 ROTATION_TOLERANCE_RAD = 1e-9  # 1e-6 mm at a lever of one metre
 
-_LEVER_MM = 1000.0  # a radian counts as this, and so does a turn as travel of a joint that slides
+_LEVER_MM = 1000.0  # a radian counts as this
 _LONGEST_TURN_RAD = 0.5
 _TIGHT_MM = 1e-9
 _BLOCK = 8192
@@ -106,7 +106,7 @@ def refine(
         ]
         return Refined(*map(np.concatenate, zip(*parts, strict=True)))
     best, trial = np.array(q_rad, dtype=float), np.array(q_rad, dtype=float)
-    count, unit = len(best), np.where(model.dh.prismatic, _LEVER_MM, 1.0)[first:]
+    count, unit = len(best), model.dh.travel_unit[first:]
     weight = np.repeat([1.0, _LEVER_MM], 3)
     active, converged = np.arange(count), np.zeros(count, dtype=bool)
     damping, lowest = np.zeros(count), np.full(count, np.inf)
