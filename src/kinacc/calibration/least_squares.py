@@ -435,7 +435,7 @@ class Descent:
             jacobian = jacobian[:, active] * self.unit
             values, threshold = _singular_values(jacobian, self.frames), self.threshold
             spectrum = Spectrum(values, threshold, _rank(values, threshold, fitted.ranks[1]))
-            if freedom > 0:
+            if variance > 0.0:
                 along = covariance_along(
                     residual, jacobian, shared_errors(system.observations),
                     fitted.root, reported.root, variance,

@@ -8,6 +8,7 @@ from typing import Self
 
 import numpy as np
 import pandas as pd
+from numpy.typing import ArrayLike
 
 from kinacc.geometry import Pose, rotation_from_quaternion
 from kinacc.kinematics.model import PAYLOAD_COLUMNS, JointState
@@ -96,7 +97,7 @@ class Observations:
         return replace(self, **columns)
 
 
-def full_poses(q_rad: np.ndarray, poses: Pose, s: np.ndarray | None = None) -> Observations:
+def full_poses(q_rad: np.ndarray, poses: Pose, s: ArrayLike = 0) -> Observations:
     """Observations of one full-pose target, one row per pose.
 
     Parameters
@@ -118,7 +119,7 @@ def full_poses(q_rad: np.ndarray, poses: Pose, s: np.ndarray | None = None) -> O
     zeros = np.zeros(count, dtype=np.int64)
     return Observations(
         q_rad=q_rad,
-        s=np.zeros(q_rad.shape, np.int8) if s is None else np.asarray(s, np.int8),
+        s=np.broadcast_to(np.asarray(s, np.int8), q_rad.shape),
         position_mm=np.asarray(poses.position_mm, dtype=float),
         rotation=np.asarray(poses.rotation, dtype=float),
         pose=np.arange(count),

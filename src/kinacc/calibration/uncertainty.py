@@ -188,10 +188,8 @@ def covariance_along(
         Roots (P, q) and (P, r) of ``Split`` by which the parameters were fitted, and along which
         the covariance is wanted.
     pooled : float
-        Variance of the rows of priors.
+        Variance of the rows of priors, above 0.
     """
-    if not pooled > 0.0:
-        return pooled * np.eye(reported.shape[1])
     variances = _variances(residual, jacobian @ fitted, errors, pooled)
     along = jacobian @ reported
     total = pooled * (np.eye(along.shape[1]) - along.T @ along)

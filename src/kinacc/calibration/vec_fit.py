@@ -205,8 +205,7 @@ def choose(
         it best, ``log_evidence``, ``log_evidence_less`` (than the best), ``chosen``, and
         ``start`` (2,), the logs of the width of the prior over the noise and of the decay.
     """
-    near = pd.DataFrame(columns=["order", "start"]) if near is None else near
-    starts = dict(zip(near["order"], near["start"], strict=True))
+    starts = {} if near is None else near.set_index("order")["start"].to_dict()
     linear = _Linear(observations, empty, parameters, rotation_weight_mm_per_rad)
     rows: list[tuple[Any, ...]] = []
     at = np.log([1.0, 0.8])
@@ -232,8 +231,8 @@ def choose(
 def table_of(rows: Sequence[tuple[Any, ...]]) -> pd.DataFrame:
     """The table of ``choose`` from order, prior, log evidence and start of each trial."""
     table = pd.DataFrame(rows, columns=["order", "prior", "log_evidence", "start"])
-    for name, size in (("delta_mm", "prior_std_mm"), ("decay", "prior_decay")):
-        table[size] = [getattr(prior, name) for prior in table["prior"]]
+    table["prior_std_mm"] = [prior.delta_mm for prior in table["prior"]]
+    table["prior_decay"] = [prior.decay for prior in table["prior"]]
     table["prior_std_mrad"] = [1e3 * prior.eps_rad for prior in table["prior"]]
     table["log_evidence_less"] = table["log_evidence"] - table["log_evidence"].max()
     table["chosen"] = table.index == int(np.argmax(table["log_evidence_less"] >= -ENOUGH))

@@ -46,9 +46,9 @@ def dh_limits(robot: Robot) -> tuple[np.ndarray, np.ndarray]:
     tuple of numpy.ndarray
         Ends (k,), (k,), rad (mm where a joint slides); infinite where a joint is coupled to others.
     """
-    ends = np.diagonal(robot.joint_map) * np.stack([robot.q_min_rad, robot.q_max_rad])
-    free = uncoupled(robot)
-    return np.where(free, ends.min(axis=0), -np.inf), np.where(free, ends.max(axis=0), np.inf)
+    free, ends = uncoupled(robot), np.stack([robot.q_min_rad, robot.q_max_rad])
+    low, high = np.sort(np.diagonal(robot.joint_map) * ends, axis=0)
+    return np.where(free, low, -np.inf), np.where(free, high, np.inf)
 
 
 def cut_to_range(
@@ -74,9 +74,8 @@ def cut_to_range(
         Ends (k,), (k,) of the smaller box.
     """
     free = uncoupled(robot)
-    ends = np.stack(range_rad) / np.where(free, np.diagonal(robot.joint_map), 1.0)
-    smaller = np.maximum(low, ends.min(axis=0)), np.minimum(high, ends.max(axis=0))
-    return np.where(free, smaller[0], low), np.where(free, smaller[1], high)
+    least, most = np.sort(range_rad / np.where(free, np.diagonal(robot.joint_map), 1.0), axis=0)
+    return np.where(free, np.maximum(low, least), low), np.where(free, np.minimum(high, most), high)
 
 
 def uncoupled(robot: Robot) -> np.ndarray:
