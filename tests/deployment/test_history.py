@@ -11,6 +11,7 @@ import scipy.stats
 import shared_data
 from calibration.simulated import columns_of
 from read_columns import Q_DEG, XYZ_MM
+from scipy.spatial.transform import Rotation
 from simulated_months import month, session
 from small_arms import results_of
 
@@ -20,7 +21,6 @@ from kinacc.deployment.history import LEVEL, session_of
 from kinacc.deployment.history_model import Moved, misfit_factor
 from kinacc.geometry import Pose
 from kinacc.kinematics import robot as robots
-from kinacc.measurements.orientation import euler
 from kinacc.tables.allowed import MOVED, SAME
 
 FAR_RAD = 0.02 * np.array([1.0, -1.0, 1.0, -1.0, 1.0, -1.0])
@@ -165,9 +165,10 @@ def ur10_series(name, number):
     path = shared_data.path_of(f"ur10_tmac/series_{name}.csv")
     table = pd.read_csv(path)[::3]
     q = np.deg2rad(table[Q_DEG].to_numpy())
-    turns = np.deg2rad(table[["rx_deg", "ry_deg", "rz_deg"]].to_numpy())
+    turns = table[["rx_deg", "ry_deg", "rz_deg"]].to_numpy()
+    turned = Rotation.from_euler("XYZ", turns, degrees=True).as_matrix()
     at = table[XYZ_MM].to_numpy()
-    seen = full_poses(robots.load("ur10").dh_joints(q), Pose(euler(turns, "XYZ"), at))
+    seen = full_poses(robots.load("ur10").dh_joints(q), Pose(turned, at))
     return replace(session(seen, number, MOVED), tool=MOVED)
 
 
