@@ -320,7 +320,8 @@ def _shares(pair: Pair, columns: np.ndarray, inverse: np.ndarray) -> np.ndarray:
     for label in np.unique(pair.cluster):
         rows = np.flatnonzero(pair.cluster == label)
         # A direction that one configuration alone decides has no residual, with or without it.
-        without = np.linalg.pinv(np.eye(len(rows)) - pull[rows] @ columns[rows].T, _FIRM, True)
+        left = np.eye(len(rows)) - pull[rows] @ columns[rows].T
+        without = np.linalg.pinv(left, rcond=_FIRM, hermitian=True)
         shares.append(without @ remaining[rows] @ pull[rows])
     return np.array(shares)
 

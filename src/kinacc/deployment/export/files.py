@@ -105,16 +105,15 @@ def yaml_text(source: Source) -> str:
 
 
 class Format(NamedTuple):
-    """A format: its text, what its file names end in, and whether it carries any model."""
+    """A format: its text, and what its file names end in."""
 
     text: Callable[[Source], str]
     ending: str
-    any_model: bool = False
 
 
 FORMATS = {
     "csv": Format(csv_text, ".csv"),
-    "json": Format(json_text, ".json", True),
+    "json": Format(json_text, ".json"),
     "latex": Format(paper_tables.latex, "_tables.tex"),
     "markdown": Format(paper_tables.markdown, "_tables.md"),
     "urdf": Format(urdf.text, ".urdf"),
@@ -123,8 +122,8 @@ FORMATS = {
 
 
 def formats_of(model: str) -> tuple[str, ...]:
-    """Formats that carry a model."""
-    return tuple(name for name, item in FORMATS.items() if model == PLAINEST or item.any_model)
+    """Formats that carry a model: one that is no DH table stands in JSON alone."""
+    return tuple(FORMATS) if model == PLAINEST else ("json",)
 
 
 def contents(source: Source, formats: Sequence[str] = ()) -> dict[str, str]:
