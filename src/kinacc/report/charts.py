@@ -20,10 +20,10 @@ from bokeh.models import (
 from bokeh.models.widgets import Select
 from bokeh.plotting import figure as bokeh_figure
 
+from kinacc.figures import style
 from kinacc.figures.fig3 import colour_range
 
-# Okabe and Ito's colours.
-BLUE, VERMILION, GREY = "#0072B2", "#D55E00", "#8a8a8a"
+GREY = "#8a8a8a"
 _QUANTITIES = {
     "position, mm": "position",
     "orientation, mrad": "orientation",
@@ -51,14 +51,14 @@ def residuals(
     data = ColumnDataSource(_small(rows))
     tips = [("", "@name")]
     tips += [(label, f"@{{{model}}}{{0.000}} mm") for model, label in models.items()]
-    looks = dict(zip(models, (("triangle", GREY), ("circle", BLUE)), strict=False))
+    looks = dict(zip(models, (("triangle", GREY), ("circle", style.BLUE)), strict=False))
     plots, glyphs = [], []
     for x, label in (("order", "row"), (joints[0], joints[0])):
         plot = _figure(label, "position error, mm", tips)
         for model, (marker, colour) in looks.items():
             drawn = plot.scatter(
                 x, model, source=data, marker=marker, color=colour, size=5, fill_alpha=0.5,
-                legend_label=models[model], nonselection_alpha=0.2, selection_color=VERMILION,
+                legend_label=models[model], nonselection_alpha=0.2, selection_color=style.VERMILION,
             )  # fmt: skip
             glyphs.append(drawn.glyph)
         plot.legend.update(click_policy="hide", orientation="horizontal")

@@ -119,8 +119,7 @@ def identifiability(tables: Tables, robot: Robot, summary: CalibrationSummary) -
     for column in ("parameter", "other"):
         pairs[column] = pairs[column].map(parameter_name)
     counts = table["status"].map(_STATUSES).value_counts()
-    rank, fit = None, pd.DataFrame(tables.get("dh_fit", {"quantity": (), "value": ()}))
-    known = fit.set_index("quantity")["value"].astype(float)
+    rank, known = None, pd.DataFrame(tables["dh_fit"]).set_index("quantity")["value"].astype(float)
     if "singular_value" in known and known["rank"]:
         share = known.loc[["singular_value"]].to_numpy()
         limit = known["rank_threshold"]
