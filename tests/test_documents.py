@@ -16,8 +16,6 @@ from shared_data import ROOT
 
 from kinacc.checks.configuration import load
 from kinacc.cli.group import main
-from kinacc.kinematics import robot as robots
-from kinacc.kinematics.robot import as_yaml
 
 PAGES = [*sorted(ROOT.glob("*.md")), *sorted((ROOT / "docs").rglob("*.md"))]
 every_page = pytest.mark.parametrize("page", PAGES, ids=lambda page: page.name)
@@ -72,14 +70,15 @@ def test_settings_that_are_shown_are_settings(page, tmp_path):
         shown = yaml.safe_load(block.text) if block.language == "yaml" else {}
         if not {"datasets", "calibration"} & set(shown):
             continue
-        arms = {name: {"robot": "ur10"} for name in shown.get("datasets", {"arm": {}})}
-        base, given = tmp_path / f"{number}.base.yaml", tmp_path / f"{number}.yaml"
-        base.write_text(yaml.safe_dump({"datasets": arms}))
+        given, arms = tmp_path / f"{number}.yaml", {}
         given.write_text(block.text)
-        for each in shown.get("datasets", {}).values():
-            if each.get("robot", "").endswith(".yaml"):
-                (tmp_path / each["robot"]).write_text(as_yaml(robots.load("ur10")))
-        load([base, given])
+        for file in ("any.csv", *re.findall(r"path: ([^,}\s]+)", block.text)):
+            (tmp_path / file).parent.mkdir(parents=True, exist_ok=True)
+            (tmp_path / file).touch()
+        for name, each in shown.get("datasets", {"arm": {}}).items():
+            file = {} if "series" in each else {"path": str(tmp_path / "any.csv")}
+            arms[name] = {"robot": "ur10", "measurements": {"source": "file", "file": file}}
+        load([given], {"datasets": arms})
 
 
 PUBLIC = re.findall(r"^- `(kinacc\.[\w.]+)`$", (ROOT / "docs/api.md").read_text(), re.MULTILINE)
