@@ -179,6 +179,7 @@ def excluded_rows(inputs: Tables, settings: Settings) -> Tables:
     reasons, used = excluded_lines(section), inputs["measurements"]
     reading = read_excluded(section, arm)
     rows = pd.DataFrame(dict(reading.columns)) if reading else pd.DataFrame(columns=list(used))
+    rows = rows.assign(session=rows.get("session"))  # a file may have none
     for name in ("target", "session"):  # only those of other rows have frames
         rows = rows[rows[name].map(str).isin({*map(str, used[name])})]  # None as well
     off: dict[str, np.ndarray] = {}
