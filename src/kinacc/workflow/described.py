@@ -133,7 +133,9 @@ def outdated_reason(folder: Path | str) -> str:
         reason = f"changed since the calibration: {first_few(changed, 3)}"
         paths = [path for path, _ in known]
     elif paths := [path for path, is_other in known if is_other]:
-        reason = f"{paths[0]} has other settings than the calibration"
+        made_by = [path for path, is_other in known if not is_other]
+        by = f", which those of {made_by[0]} made" if made_by else ""
+        reason = f"{paths[0]} has other settings than the calibration{by}"
     else:
         return ""
     return f"{reason}; run {shlex.join(['kinacc', 'calibrate', *paths[:1]])}"
