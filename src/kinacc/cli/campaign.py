@@ -21,8 +21,9 @@ from kinacc.cli.rows import joints_given, numbers_given
 from kinacc.errors import input_error
 from kinacc.figures.save import render
 from kinacc.report.campaign import campaign_page, markdown, section
+from kinacc.report.page import html
 from kinacc.report.rendering import lines as texts
-from kinacc.tables.atomic import require_writable, write_together
+from kinacc.tables.atomic import require_writable, write_together, write_whole
 from kinacc.tables.store import content_of, to_table
 
 _SHA256 = 64  # hexadecimal digits
@@ -150,7 +151,7 @@ def report(folder: str, to: str | None, out: Output) -> None:
     require_writable(contents, out.force or to is None)
     write_together(contents)
     if out.page is not None:
-        out.write_page(campaign_page(opened, part), metadata)
+        write_whole(out.page, html(campaign_page(opened, part), metadata).encode())
     result, files = campaign.status(), [Path(path).name for path in contents]
     lines = [_lines(result)[0], f"{into}: {', '.join(files)}", out.page or ""]
     answer = {**vars(result), "report": str(into), "files": files, "page": out.page}

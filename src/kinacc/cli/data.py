@@ -22,7 +22,7 @@ from kinacc.cli.process import AGAINST, DONE
 from kinacc.config import schema
 from kinacc.config.series import MOVED, SAME
 from kinacc.deployment import adding
-from kinacc.errors import Problem, first_few, gathered, input_error, refuse
+from kinacc.errors import InputError, Problem, first_few, gathered, input_error, refuse
 from kinacc.figures.calibration import draw_check
 from kinacc.kinematics import robot
 from kinacc.measurements.reader import excluded_lines, read
@@ -144,10 +144,10 @@ def exclude(file: str, lines: str, reason: str | None, dataset: str | None, out:
     name, settings = measured_data_set(file, dataset)
     section = settings["measurements"]["file"]
     numbers = _numbers(lines)
-    known = [number for number in numbers if number in excluded_lines(section)]
-    problems = [Problem("--lines", f"{first_few(known)} excluded already")] if known else []
-    problems += [] if (reason or "").strip() else [_EMPTY_REASON]
-    refuse(problems)
+    if known := sorted({*numbers}.intersection(excluded_lines(section))):
+        raise input_error("--lines", f"{first_few(known)} excluded already")
+    if not (reason or "").strip():
+        raise InputError(_EMPTY_REASON)
     item = {"lines": numbers, "reason": reason}
     read({**section, "exclude": [*section["exclude"], item]}, robot.load(settings["robot"]))
     add_to(file, ("datasets", name, "measurements", "file", "exclude"), [item])

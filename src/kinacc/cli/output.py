@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import io
 import json
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass, fields
 from functools import wraps
 from pathlib import Path
@@ -22,8 +22,6 @@ from kinacc.tables.atomic import require_writable, write_whole
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
-
-    from kinacc.report.page import Page
 
 TABLES = (".csv", ".json", ".parquet", ".xlsx")
 PICTURES = (".svg", ".png", ".pdf")
@@ -82,12 +80,6 @@ class Output:
         path = Path(self.picture or "")
         write(figure, {path.suffix[1:]: path})
 
-    def write_page(self, page: Page, marks: Mapping[str, object]) -> None:
-        """Write the page a person reads in a browser."""
-        from kinacc.report.page import html
-
-        write_whole(Path(self.page or ""), html(page, marks).encode())
-
 
 def answers(
     table: bool = False,
@@ -130,7 +122,6 @@ def write_table(table: pd.DataFrame, path: Path | str, answer: object = None) ->
     """Write a table whole, by the ending: .csv, .xlsx, .parquet, or .json of the whole answer."""
     suffix, content = Path(path).suffix, io.BytesIO()
     if suffix == ".json":
-        answer = {"rows": table} if answer is None else answer
         write_whole(path, (json.dumps(plain(answer), indent=1) + "\n").encode())
         return
     if suffix == ".parquet":

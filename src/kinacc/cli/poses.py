@@ -79,7 +79,7 @@ def predict(
     """
     calibration = choice.calibration_of(folder, model, session)
     arm = calibration.robot
-    inputs, q = rows.joints_of(arm, joints, joints_deg, choice.joint_answers(file))
+    inputs, q = rows.joints_of(arm, joints, joints_deg, file)
     with reporting("predict"):
         result = prediction.predict(calibration, q, inputs.directions, frame, point, inputs.payload)
     named = pd.DataFrame({"row": inputs.label, **joint_columns(arm.dh.prismatic, q)})
