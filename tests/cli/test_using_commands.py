@@ -35,7 +35,7 @@ def test_frames_are_not_asked_for_where_the_input_is_closed(study, tmp_path):
 def test_an_orientation_in_two_forms_is_refused(study, tmp_path):
     path = tmp_path / "poses.csv"
     path.write_text("x_mm,y_mm,z_mm,qw,qx,qy,qz,rx_deg,ry_deg,rz_deg\n9,0,8,1,0,0,0,0,90,0\n")
-    assert "more than one form" in call("compensate", study, path, code=2).output
+    assert "do not tell the orientation" in call("compensate", study, path, code=2).output
 
 
 def test_what_campaign_start_names_next_runs_as_printed(study, tmp_path):

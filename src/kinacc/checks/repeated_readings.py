@@ -11,7 +11,7 @@ import pandas as pd
 from kinacc.checks import digits
 from kinacc.checks import repeatability as checks
 from kinacc.checks.repeatability import Noise
-from kinacc.errors import Problem, first_few, input_error, refuse
+from kinacc.errors import Problem, first_few, gathered, input_error, refuse
 from kinacc.measurements.intake.columns import POINTS
 from kinacc.measurements.layout import listed
 from kinacc.measurements.rows import read_rows
@@ -146,9 +146,10 @@ def read_repeats(path: str, rows_are: str | None) -> RepeatedFile:
             problems.append(Problem(table.where(names[name]), message, "one", fix))
     time = next((name for name in _HOURS if name in table.columns), None)
     if time is not None:
-        rows["hours"] = seconds(table, time, problems) * _HOURS[time]
-        if (gaps := np.flatnonzero(rows["hours"].isna())).size:
-            problems.append(Problem(table.where(time, gaps), "no time"))
+        with gathered(problems):
+            rows["hours"] = seconds(table, time) * _HOURS[time]
+            if (gaps := np.flatnonzero(rows["hours"].isna())).size:
+                problems.append(Problem(table.where(time, gaps), "no time"))
     if "pose" in rows and "visit" not in names:
         again = np.flatnonzero(rows["pose"] == rows["pose"].shift())
         if rows_are is None and again.size:

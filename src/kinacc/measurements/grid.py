@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from kinacc.errors import Problem, and_more, refuse
+from kinacc.errors import and_more, input_error
 from kinacc.measurements.column_names import WORDS
 from kinacc.measurements.layout import Layout
 from kinacc.measurements.row_names import RowNames
@@ -100,7 +100,7 @@ def tabled(path: str, rows: Iterable[Row], layout: Layout, sheet: bool = False) 
             for single in (names, under, *(cells for _, cells in readings)):
                 del single[place : place + 1]
     word = "row" if sheet else "line"
-    refuse(_problems(path, names, readings, line, word), f"{path} cannot be read")
+    _refuse_no_table(path, names, readings, f"{path}: {word}", line or 1)
     cells = frame(dict(zip(names, zip(*(c for _, c in readings), strict=True), strict=True)))
     units = {name: str(unit) for name, unit in zip(names, under, strict=False)}
     label = [str(filled(first)[0]).strip()[:30] for first in aside.values()][:1]
@@ -112,7 +112,6 @@ def tabled(path: str, rows: Iterable[Row], layout: Layout, sheet: bool = False) 
         layout.thousands,
         units | _units_behind(cells, units),
         tuple(f"{RowNames(word=word).spans(aside)}: not read ({text})" for text in label),
-        tuple(aside),
         RowNames(word=word),
     )
 
@@ -141,21 +140,20 @@ def _units_behind(cells: pd.DataFrame, units: dict[str, str]) -> dict[str, str]:
     return behind
 
 
-def _problems(path: str, names: list[str], rows: list[Row], line: int, word: str) -> list[Problem]:
+def _refuse_no_table(path: str, names: list[str], rows: list[Row], where: str, line: int) -> None:
+    """Raise InputError for names or rows that are missing, doubled names and ragged rows."""
     if not names:
-        return [Problem(path, "the file is empty", "a line of column names, then rows")]
-    problems = [] if rows else [Problem(path, "no rows under the column names", "a row at least")]
-    where = f"{path}: {word} {line or 1}"
+        raise input_error(path, "the file is empty", "a line of column names, then rows")
+    if not rows:
+        raise input_error(path, "no rows under the column names", "a row at least")
     if len(names) == 1:
         fix = "set measurements.file.delimiter to ';', ',' or a tab"
-        problems.append(Problem(where, f"only one column, {names[0][:60]!r}", "several", fix))
+        raise input_error(f"{where} {line}", f"only one column, {names[0][:60]!r}", "several", fix)
     if doubled := sorted(name for name, count in Counter(names).items() if count > 1):
-        problems.append(Problem(where, f"column names given twice: {', '.join(doubled)}"))
+        raise input_error(f"{where} {line}", f"column names given twice: {', '.join(doubled)}")
     ragged = [(number, len(cells)) for number, cells in rows if len(cells) != len(names)]
-    if ragged and not problems:
-        number, width = ragged[0]
-        where = f"{path}: {word} {number}{and_more(len(ragged) - 1)}"
+    for number, width in ragged[:1]:
         message = f"{width} cells under {len(names)} column names"
         fix = "check delimiter and decimal mark: decimal commas cannot stand between commas"
-        problems.append(Problem(where, message, f"{len(names)} cells in every row", fix))
-    return problems
+        place = f"{where} {number}{and_more(len(ragged) - 1)}"
+        raise input_error(place, message, f"{len(names)} cells in every row", fix)

@@ -135,10 +135,8 @@ def _rows_by_time(
     points: RawTable, joints: RawTable, how: JointsFile
 ) -> tuple[np.ndarray, np.ndarray]:
     """Row of the joints (n,) next in time to every point, -1 for none; and where the arm moved."""
-    problems: list[Problem] = []
-    here = seconds(points, how.key_of_points or "", problems) + how.clock_offset_s
-    there = seconds(joints, how.key or "", problems)
-    refuse(problems)
+    here = seconds(points, how.key_of_points or "") + how.clock_offset_s
+    there = seconds(joints, how.key or "")
     q = joint_values(joints)
     row, moving = np.full(len(here), -1), np.zeros(len(here), dtype=bool)
     for point, time in enumerate(here):

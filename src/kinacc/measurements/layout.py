@@ -153,8 +153,8 @@ def find(
             message = f"is not there, but measurements.file.columns maps {name} to it"
             finder.problem(column, message, listed(table))
     columns = FileColumns(
-        finder.in_pulses(joints),
-        finder.in_pulses(commanded),
+        joints,
+        commanded,
         directions,
         tuple(target for target in targets if target.position),
         single,
@@ -176,6 +176,12 @@ class _Finder:
     ) -> None:
         self.table, self.layout, self.problems = table, layout, problems
         self.slides = {f"q{n}{end}" for n in np.flatnonzero(prismatic) + 1 for end in ("", "_cmd")}
+        self.per_deg = dict(enumerate(layout.pulses_per_deg or (), 1))
+        fits = len(self.per_deg) == len(prismatic) and 0.0 not in self.per_deg.values()
+        if self.per_deg and len(prismatic) and not fits:
+            where, allowed = "measurements.file.pulses_per_deg", "a number for each joint, none 0"
+            problems.append(Problem(where, f"{layout.pulses_per_deg}", allowed))
+            self.per_deg = {}
         self.mapped_keys = {self.kind(name)[2] for name in layout.columns}
 
     def kind(self, quantity: str) -> tuple[Mapping[str, float], str, str]:
@@ -183,8 +189,10 @@ class _Finder:
         layout, part = self.layout, split(quantity)[1]
         if quantity in (*self.slides, *PAYLOAD[1:]) or part in (*POSITION, *STD):
             return LENGTH, layout.length_unit, "length_unit"
-        if re.fullmatch(r"q\d(?:_cmd)?", quantity):
-            return ANGLE, layout.joint_unit, "" if layout.pulses_per_deg else "joint_unit"
+        if joint := re.fullmatch(r"q(\d)(?:_cmd)?", quantity):
+            if per_deg := self.per_deg.get(int(joint[1])):
+                return dict.fromkeys(ANGLE, ANGLE["deg"] / per_deg), layout.joint_unit, ""
+            return ANGLE, layout.joint_unit, "joint_unit"
         if part in (*ANGLES, *ANGLES_IN_ORDER):
             return ANGLE, layout.orientation.unit, "orientation.unit"
         return _SINGLE.get(quantity, ({"": 1.0}, "", ""))
@@ -229,18 +237,6 @@ class _Finder:
         elif missing and places:
             self.problem(", ".join(missing), f"is missing beside {', '.join(places)}")
         return () if missing else tuple(places.values())
-
-    def in_pulses(self, places: tuple[Place, ...]) -> tuple[Place, ...]:
-        """The joints; pulses of their motors have a number per degree for each joint."""
-        count = self.layout.pulses_per_deg
-        if not places or not count:
-            return places
-        if len(count) != len(places) or 0.0 in count:
-            allowed = "one number for each joint, none of them 0"
-            where = "measurements.file.pulses_per_deg"
-            self.problems.append(Problem(where, f"{list(count)}", allowed))
-            return places
-        return tuple(Place(p.column, ANGLE["deg"] / n) for p, n in zip(places, count, strict=True))
 
     def targets(self) -> list[str]:
         """Names of the targets to read, in order of their columns.

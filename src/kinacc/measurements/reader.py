@@ -90,8 +90,7 @@ def _loaded(section: Settings) -> RawTable:
     """The whole file. Raises InputError where it excludes lines that hold no reading."""
     table = load(section["path"], Layout.of(section))
     excluded, where = excluded_lines(section), "measurements.file.exclude"
-    absent = sorted(set(excluded) - set(table.line.tolist()) - set(table.not_rows))
-    if absent:
+    if absent := sorted(set(excluded) - set(table.line.tolist())):
         message = f"no reading in lines {', '.join(map(str, absent))}"
         allowed = f"lines {table.line[0]} to {table.line[-1]} of {table.path}"
         raise input_error(where, message, allowed)
@@ -206,10 +205,10 @@ def _target(
         problems += faults.of_rows(table, [place], stated < 0.0, message, "0 or above", stated)
     std = np.where(std > 0.0, std, np.nan)  # a zero states nothing
     part = {"there": ~gaps.all(axis=1) & ~void, "void": void, "target": target.name}
-    part |= dict(zip(POSITION, position.T, strict=True))
-    part |= dict(zip(QUATERNION, quaternions(turn, layout.orientation).T, strict=True))
-    part |= dict(zip(UNCERTAINTY, std.T, strict=True))
-    return part | {f"turn {number}": values for number, values in enumerate(turn.T)}
+    values = np.hstack([position, quaternions(turn, layout.orientation), std, turn])
+    turned = [f"turn {number}" for number in range(turn.shape[1])]
+    names = (*POSITION, *QUATERNION, *UNCERTAINTY, *turned)
+    return part | dict(zip(names, values.T, strict=True))
 
 
 def _shared(

@@ -2,25 +2,23 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
 
-from kinacc.config.measured import POSITION, Orientation
+from kinacc.config.measured import POSITION
 from kinacc.config.names import of_csv
-from kinacc.errors import Problem, input_error, refuse
+from kinacc.errors import Problem, refuse
 from kinacc.geometry import Pose
 from kinacc.measurements import faults
 from kinacc.measurements.intake import pairs
 from kinacc.measurements.intake.choices import Answers
-from kinacc.measurements.intake.columns import POINTS, POSES
+from kinacc.measurements.intake.columns import POSES
 from kinacc.measurements.intake.guess import described
 from kinacc.measurements.layout import (
     JOINTS,
-    TOOL,
     FileColumns,
     Layout,
     Place,
@@ -29,13 +27,6 @@ from kinacc.measurements.layout import (
 from kinacc.measurements.orientation import rotations
 from kinacc.measurements.reader import payload, stacked, travel
 from kinacc.measurements.table import RawTable
-
-_FIRST_NAMES = {  # of a file under our names
-    JOINTS: r"q1_(?:deg|rad|mm|m)",
-    POINTS: r"e?x_(?:mm|m)",
-    POSES: r"(?:qw|rv?x_(?:deg|rad))",
-}
-_TURNS = {"quaternion": "qw", "rotation_vector": "rvx", "euler": "rx"}
 
 
 @dataclass(frozen=True)
@@ -59,7 +50,7 @@ class Rows:
     unused
         Columns that are not used.
     notes
-        How a file under other names than ours was read, and rows that are left out.
+        How the file was read, and rows that are left out.
     table, columns
         The file, and its columns.
     """
@@ -86,8 +77,7 @@ def read_rows(
 ) -> Rows:
     """Rows of a file that must hold ``need``: joints, points or poses.
 
-    A file under our names (``q1_deg``, ``x_mm``, ``qw``, ``rvx_deg``, ``rx_deg`` ..) is read by
-    them, any other as ``kinacc init`` reads it.
+    A file is read as ``kinacc init`` reads it.
 
     Parameters
     ----------
@@ -103,7 +93,7 @@ def read_rows(
     InputError
         Listing every problem, or the questions that the file leaves open.
     """
-    table, layout, notes = open_table(path, need, answers)
+    table, layout, notes = _open(path, need, answers)
     problems: list[Problem] = []
     columns = find(table, layout, prismatic, problems, (JOINTS if need == JOINTS else POSITION,))
     target = next(iter(columns.targets), None) if need != JOINTS else None
@@ -163,34 +153,17 @@ def joint_columns(prismatic: np.ndarray, joints: np.ndarray) -> dict[str, np.nda
     }
 
 
-def open_table(
-    path: str | Path, need: str = POINTS, answers: Answers | None = None
+def _open(
+    path: str | Path, need: str, answers: Answers | None
 ) -> tuple[RawTable, Layout, tuple[str, ...]]:
     """A file of ``need``, the meaning of its columns, and notes on how it was understood."""
     answers = {key: value for key, value in (answers or {}).items() if value}
     looked = pairs.look(path, answers, need)
-    if any(re.fullmatch(_FIRST_NAMES[need], name) for name in looked.table.columns):
-        # Texts of a CSV have an apostrophe that keeps them from being a formula.
-        cells = looked.table.columns.map(lambda c: of_csv(c) if isinstance(c, str) else c)
-        table = replace(looked.table, columns=cells)
-        return table, _plain_layout(table, need), looked.notes
+    # Texts of a CSV have an apostrophe that keeps them from being a formula.
+    cells = looked.table.columns.map(lambda c: of_csv(c) if isinstance(c, str) else c)
+    looked = replace(looked, table=replace(looked.table, columns=cells))
     guess = described(looked, answers, need)
-    columns = ", ".join(f"{name} is {column}" for name, column in guess.section["columns"].items())
-    notes = (*guess.notes, *guess.assumed.values(), columns)
+    named = [f"{ours} is {name}" for ours, name in guess.section["columns"].items()
+             if name.removeprefix(ours)[:1] not in ("", "_")]  # fmt: skip
+    notes = (*guess.notes, *guess.assumed.values(), *([", ".join(named)] if named else []))
     return guess.table, Layout.of(guess.section), notes
-
-
-def _plain_layout(table: RawTable, need: str) -> Layout:
-    """The layout of a table under our names, by the kind of its orientations."""
-    names = {*table.columns} if need == POSES else set()
-    kinds = [kind for kind, name in _TURNS.items()
-             if names & {name, f"{name}_deg", f"{name}_rad"}]  # fmt: skip
-    if len(kinds) > 1:
-        message = "is given in more than one form"
-        raise input_error(f"{table.path}: orientation", message, "one form")
-    kind = next(iter(kinds), "none")
-    unit = "rad" if "rvx_rad" in names else "deg"
-    vector = {f"r{axis}": f"rv{axis}_{unit}" for axis in "xyz"}
-    columns = vector if kind == "rotation_vector" else {}
-    turn = Orientation.model_construct(kind=kind, unit=unit)
-    return Layout().but(columns=columns, orientation=turn, targets=[TOOL])

@@ -30,8 +30,8 @@ class RawTable:
     ``path`` names the file, with the sheet where it has several. ``line`` (n,) is the line of the
     file a row stands on, its row in a sheet or its number from 1 in a Parquet file. ``units`` are
     those stated under the names or behind the numbers, by column. ``notes`` name what of the file
-    is no row, ``not_rows`` are its lines, ``row_names`` what its rows are called. ``key``: where
-    joints stand in another file, the column by which they belong to a point.
+    is no row, ``row_names`` what its rows are called. ``key``: where joints stand in another file,
+    the column by which they belong to a point.
     """
 
     path: str
@@ -41,7 +41,6 @@ class RawTable:
     thousands: str | None = None
     units: Mapping[str, str] = field(default_factory=dict)
     notes: tuple[str, ...] = ()
-    not_rows: tuple[int, ...] = ()
     row_names: RowNames = field(default_factory=RowNames)
     key: str | None = None
 

@@ -8,7 +8,7 @@ from collections.abc import Collection
 import numpy as np
 import pandas as pd
 
-from kinacc.errors import Problem
+from kinacc.errors import input_error
 from kinacc.measurements.table import RawTable
 
 _CLOCK = r"(?:(\S+)[ T])?(\d{1,2}:\d{2}:\d{2}(?:[.,]\d+)?) ?(?:Z|[+-]\d{2}:?\d{2})?"
@@ -27,14 +27,13 @@ STILL_RAD = np.deg2rad(0.02)  # joints that move less stand still
 _YEARS = (1990, 2100)  # of measurements; others are numbers that look like a day
 
 
-def seconds(table: RawTable, column: str, problems: list[Problem]) -> np.ndarray:
-    """Times (n,) in s from some zero; what a spreadsheet has made of them is a problem."""
+def seconds(table: RawTable, column: str) -> np.ndarray:
+    """Times (n,) in s from some zero. Raises InputError for what a spreadsheet has made of them."""
     fix = "export the times again, with hours and seconds, as text or as a number of seconds"
     texts = pd.Series(table.texts(column), dtype=object)
     if (bad := texts[texts.str.fullmatch(_SPOILT)]).size:
         message = f"times that are rounded, or without hours or seconds: {bad.iloc[0]}"
-        problems.append(Problem(table.where(column), message, fix=fix))
-        return np.full(len(table), np.nan)
+        raise input_error(table.where(column), message, fix=fix)
     values = table.values(column)
     if np.isfinite(values).any():
         units = [u for u in re.findall(r"[^\W\d_]+", column) if u in _UNITS]
@@ -54,7 +53,7 @@ def seconds(table: RawTable, column: str, problems: list[Problem]) -> np.ndarray
             values = values + of_row * 86400.0
     if np.unique(values[np.isfinite(values)]).size < 2:
         message = f"holds no times that differ, or dates of several readings: {texts[0]}"
-        problems.append(Problem(table.where(column), message, "2026-03-01 12:30:05.2", fix))
+        raise input_error(table.where(column), message, "2026-03-01 12:30:05.2", fix)
     return values
 
 

@@ -17,14 +17,12 @@ Answers = Mapping[str, Any]  # to choices, by their keys
 class Choice:
     """A question ``about`` a file, and the meaning of each of the ``answers`` to ``option``.
 
-    ``option`` is that of ``kinacc init``, such as --decimal. ``without``: none of the answers is
-    one too.
+    ``option`` is that of ``kinacc init``, such as --decimal.
     """
 
     option: str
     about: str
     answers: Mapping[str, str]
-    without: bool = False
 
 
 class Undecided(InputError):
@@ -35,7 +33,6 @@ class Undecided(InputError):
         for choice in choices:
             meant = "; ".join(f"{value}: {text}" for value, text in choice.answers.items())
             ways = [f"{choice.option} {shlex.quote(value)}" for value in choice.answers]
-            ways += ["--orientation none"] if choice.without else []
             fix = f"give {' or '.join(ways)}" + " (or several)" * (choice.option == TAKE)
             problems.append(Problem(path, f"{choice.about}: {meant}", fix=fix))
         super().__init__(problems, f"{path} leaves open how it is to be read")

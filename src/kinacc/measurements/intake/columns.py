@@ -165,10 +165,10 @@ class _Choice:
                 distinct.append(group)
         return [group for group in candidates if group in distinct]
 
-    def _ask(self, about: str, groups: Sequence[Group], without: bool = False) -> Group:
+    def _ask(self, about: str, groups: Sequence[Group]) -> Group:
         answers = {group.names[0]: group.text for group in groups}
         if len(answers) > 1 or self.need == MEASUREMENTS:
-            self.questions.append(Choice(TAKE, about, answers, without))
+            self.questions.append(Choice(TAKE, about, answers))
         return groups[0]
 
     def joints(self) -> Group | None:
@@ -228,7 +228,7 @@ class _Choice:
         if not why:
             return candidates
         self._ask(f"the names do not tell the measured point ({why})", candidates)
-        return _named_apart(candidates)
+        return candidates
 
     def turns(self, points: Sequence[Group]) -> dict[str, Group]:
         """Orientations by target; the reader takes those of the kind of the first."""
@@ -253,7 +253,7 @@ class _Choice:
             if rest[0].role in (MEASURED, point.role) or (rest[0].role == PLAIN and alone):
                 return rest[0]
         about = f"the names do not tell the orientation measured with {point.target}"
-        return self._ask(about, rest, without=True)
+        return self._ask(f"{about} (--orientation none: not read)", rest)
 
     def spreads(self, points: Sequence[Group]) -> dict[str, dict[str, Name]]:
         """Standard deviations by target, in the unit of the point that they belong to."""
@@ -267,7 +267,6 @@ class _Choice:
             if (
                 point is None
                 or (group.weak and not_meant)
-                or point.role in _NOT_MEASURED
                 or group.units != point.units
                 or point.target in spreads
             ):

@@ -19,7 +19,7 @@ from kinacc.measurements.intake.choices import Answers, Choice, Undecided
 from kinacc.measurements.intake.columns import MEASUREMENTS, NamedColumns
 from kinacc.measurements.intake.groups import JOINTS, POINT, POSE, PULSES, listed
 from kinacc.measurements.intake.text import Looked
-from kinacc.measurements.layout import ANGLE, LENGTH
+from kinacc.measurements.layout import ANGLE, LENGTH, TOOL
 from kinacc.measurements.table import RawTable, numbers_of
 
 _FULL_TURN_RAD = 2.0 * np.pi * 1.05
@@ -101,7 +101,6 @@ def described(looked: Looked, answers: Answers, need: str = MEASUREMENTS) -> Gue
     if need != MEASUREMENTS and joint_unit == "rad" and "joint_unit" in guesser.assumed:
         meant = {"rad": "radians", "deg": "degrees, of an arm that hardly moves"}
         raise Undecided(table.path, Choice("--joint-unit", guesser.assumed["joint_unit"], meant))
-    refuse(guesser.problems, f"{table.path} cannot be described")
     section: dict[str, Any] = {"path": looked.path, **looked.written.written()}
     if need == MEASUREMENTS:
         q_rad = guesser.stacked(columns.joints) * ANGLE[joint_unit] / np.array(per_deg or 1.0)
@@ -116,7 +115,7 @@ def described(looked: Looked, answers: Answers, need: str = MEASUREMENTS) -> Gue
         "joint_unit": joint_unit,
         "length_unit": length_unit,
         "orientation": guesser.orientation(angle_unit),
-        "targets": list(columns.targets),
+        "targets": list(columns.targets) or [TOOL],
         "columns": {ours: name.column for ours, name in columns.by_our_names().items()},
     }
     section |= {"pulses_per_deg": per_deg} if per_deg else {}
@@ -153,7 +152,7 @@ def _missing(
 
 
 class _Guesser:
-    """Settings of columns by their names and numbers; ``assumed`` and ``problems`` grow.
+    """Settings of columns by their names and numbers; ``assumed`` grows.
 
     ``void``: numbers in place of a reading.
     """
@@ -161,7 +160,7 @@ class _Guesser:
     def __init__(self, looked: Looked, columns: NamedColumns, answers: Answers) -> None:
         self.looked, self.table, self.columns, self.answers = looked, looked.table, columns, answers
         self.first = next(iter(columns.targets.values()), {})
-        self.assumed, self.problems = dict(looked.assumed), list[Problem]()
+        self.assumed = dict(looked.assumed)
         self.void: set[float] = set()
 
     def stacked(self, names: Sequence[Name]) -> np.ndarray:
@@ -246,8 +245,7 @@ class _Guesser:
         message = f"are in {' and '.join(sorted(units))}{option}; the largest number is {most:.4g}"
         allowed = f"one unit for all: {' or '.join(known)}, at most {_LARGEST_M:g} m"
         where = f"{self.table.path}: columns {', '.join(columns)}"
-        self.problems.append(Problem(where, message, allowed))
-        return usual
+        raise input_error(where, message, allowed)
 
     def orientation(self, angle_unit: str) -> dict[str, str]:
         """The section on orientations, as answered or by the names of their columns."""
@@ -271,13 +269,16 @@ class _Guesser:
     def sigma(self) -> int:
         """How many standard deviations the uncertainties that are read are."""
         answer = self.answers.get("sigma", "")
-        spreads = [name for target in self.columns.targets.values()
-                   for quantity, name in target.items() if quantity.startswith("std_")]  # fmt: skip
-        coverage = {name.coverage for name in spreads}
-        numbers = (coverage - {0}) | ({int(answer)} if answer.isdecimal() else set())
-        if len(coverage) > 1 or len(numbers) > 1:
-            columns = ", ".join(name.column for name in spreads)
-            message = f"not all of {columns} are so many standard deviations"
+        coverage = {
+            name.column: name.coverage
+            for target in self.columns.targets.values()
+            for quantity, name in target.items()
+            if quantity.startswith("std_")
+        }
+        stated = {*coverage.values()}
+        numbers = (stated - {0}) | ({int(answer)} if answer.isdecimal() else set())
+        if len(stated) > 1 or len(numbers) > 1:
+            message = f"not all of {', '.join(coverage)} are so many standard deviations"
             where = f"--sigma {answer}" if answer else self.looked.path
             fix = "give --sigma none, which reads none of them"
             raise input_error(where, message, "one number for all of them", fix)

@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from kinacc.config.measured import JointsFile, Written
-from kinacc.errors import Problem, first_few, gathered, input_error, refuse
+from kinacc.errors import first_few, gathered, input_error
 from kinacc.measurements.column_names import WORDS, Name, name_of
 from kinacc.measurements.files import EXCEL, refuse_other_files
 from kinacc.measurements.intake import columns, text
@@ -87,7 +87,7 @@ def _together(files: Sequence[Looked], answers: Answers) -> Looked:
         fix = "name the columns q1_deg .. and x_mm, y_mm, z_mm"
         raise input_error(paths, message, fix=fix)
     joints, points = holding[0], others[0]
-    how, notes = _join(joints, points, answers)
+    how = _join(joints, points, answers)
 
     def beside(name: Name) -> Name:
         return replace(name, column=beside_name(name.column, points.table))
@@ -102,24 +102,26 @@ def _together(files: Sequence[Looked], answers: Answers) -> Looked:
     )
     written = joints.written.model_dump(include={*Written.model_fields})
     section = {**how.model_dump(), **written, "path": joints.path}
-    notes = (*points.notes, *joints.notes, *notes)
+    note = {
+        NAME: f"joined where {how.key} of the joints is {how.key_of_points} of the points",
+        TIME: f"joined by time: {how.clock_offset_s:g} s are added to times of points",
+        ORDER: "joined by order",
+    }[how.by]
     table = joined(points.table, joints.table, how)
+    notes = (*points.notes, *joints.notes, note)
     return replace(points, table=table, columns=meaning, joints=section, notes=notes)
 
 
-def _join(joints: Looked, points: Looked, answers: Answers) -> tuple[JointsFile, tuple[str, ...]]:
+def _join(joints: Looked, points: Looked, answers: Answers) -> JointsFile:
     """How the rows belong together, as answered or as the files leave no doubt."""
     answer = answers.get("join", "")
     if answer == ORDER:
-        return JointsFile(by="order"), ()
-    key, _, key_of_points = answer.partition("=") if answer != TIME else ("", "", "")
-    notes: tuple[str, ...] = ()
-    if not answer and (keys := _by_names(joints, points)):
-        key, key_of_points = keys
-        notes = (f"joined where {key} of the joints is {key_of_points} of the points",)
-    if key:
-        key_of_points = key_of_points or key
-        return JointsFile.model_construct(by="name", key=key, key_of_points=key_of_points), notes
+        return JointsFile(by="order")
+    keys = None if answer else _by_names(joints, points)
+    key, _, key_of_points = answer.partition("=")
+    if keys or answer not in ("", TIME):
+        key, key_of_points = keys or (key, key_of_points or key)
+        return JointsFile.model_construct(by="name", key=key, key_of_points=key_of_points)
     times = _times(joints), _times(points)
     if all(times):
         return _by_clock(joints, points, *times, answers)
@@ -132,12 +134,14 @@ def _by_names(joints: Looked, points: Looked) -> tuple[str, str] | None:
     counted: list[tuple[str, str]] = []
     as_many = len(joints.table) == len(points.table)
     for keys in product(_keys(joints), _keys(points)):
+        is_named = any(WORDS["pose_names"] & {*name_of(key).terms} for key in keys)
         with gathered([]):
             row = rows_by_name(points.table, joints.table, *keys)
             count = int(np.sum(row >= 0))
             if count >= max(_SHARE * min(len(row), len(joints.table)), 2):
                 # A count of rows is no name: a point that was left out shifts all behind it.
-                if all(map(_counts_rows, (joints, points), keys, (as_many, as_many))):
+                counts_rows = all(map(_counts_rows, (joints, points), keys))
+                if counts_rows and not (as_many and is_named):
                     counted.append(keys)
                 else:
                     certain[keys] = row.tobytes()
@@ -161,12 +165,11 @@ def _keys(file: Looked) -> list[str]:
     return keys
 
 
-def _counts_rows(file: Looked, key: str, as_many: bool) -> bool:
-    """Whether a key only counts rows; ``as_many`` of both are poses where a term states it."""
+def _counts_rows(file: Looked, key: str) -> bool:
+    """Whether a key only counts rows."""
     names = labels(file.table.columns[key])
     counts = [int(name) for name in names if name.isdecimal() and len(name) <= 100]
-    is_named = as_many and WORDS["pose_names"] & {*name_of(str(key)).terms}
-    return len(counts) == len(names) and {*np.diff(counts)} == {1} and not is_named
+    return len(counts) == len(names) and {*np.diff(counts)} == {1}
 
 
 def _times(file: Looked) -> str:
@@ -177,31 +180,23 @@ def _times(file: Looked) -> str:
 
 def _by_clock(
     joints: Looked, points: Looked, key: str, key_of_points: str, answers: Answers
-) -> tuple[JointsFile, tuple[str, ...]]:
-    problems: list[Problem] = []
-    there = seconds(joints.table, key, problems)
-    here = seconds(points.table, key_of_points, problems)
-    refuse(problems, "the times are no key")
+) -> JointsFile:
+    there, here = seconds(joints.table, key), seconds(points.table, key_of_points)
     good = np.isfinite(there)
     stands, within = standstills(there[good], joint_values(joints.table)[good])
-    answer, notes = answers.get("clock_offset"), list[str]()
-    if answer is None:
-        ways = offsets(here, stands, within)
+    if (answer := answers.get("clock_offset")) is not None:
+        ways = numbers_of(answer).tolist()
         if len(ways) != 1:
-            about = f"{'several' if ways else 'no'} offsets of the clocks put the points, by "
-            about += f"{key_of_points}, at the standstills of the arm, by {key}"
-            meant = {f"{way:.3f}": f"{way:.3f} s are added to times of points" for way in ways[:4]}
-            meant = meant or {"0": "both clocks showed the same"}
-            raise Undecided(points.table.path, Choice("--clock-offset", about, meant))
-        answer, where = ways[0], points.table.path
-        notes.append(f"joined by time: {answer:g} s are added to {key_of_points} of {where}")
-    offset_s = numbers_of(str(answer)).tolist()
-    if len(offset_s) != 1:
-        raise input_error("--clock-offset", repr(answer), "seconds")
-    how = JointsFile.model_construct(
-        by="time", key=key, key_of_points=key_of_points, clock_offset_s=offset_s[0], within_s=within
+            raise input_error("--clock-offset", repr(answer), "seconds")
+    elif len(ways := offsets(here, stands, within)) != 1:
+        about = f"{'several' if ways else 'no'} offsets of the clocks put the points, by "
+        about += f"{key_of_points}, at the standstills of the arm, by {key}"
+        meant = {f"{way:.3f}": f"{way:.3f} s are added to times of points" for way in ways[:4]}
+        meant = meant or {"0": "both clocks showed the same"}
+        raise Undecided(points.table.path, Choice("--clock-offset", about, meant))
+    return JointsFile.model_construct(
+        by="time", key=key, key_of_points=key_of_points, clock_offset_s=ways[0], within_s=within
     )
-    return how, tuple(notes)
 
 
 def _undecided(joints: Looked, points: Looked, ways: Sequence[tuple[str, str]]) -> Undecided:
