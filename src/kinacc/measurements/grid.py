@@ -103,7 +103,9 @@ def tabled(path: str, rows: Iterable[Row], layout: Layout, sheet: bool = False) 
     _refuse_no_table(path, names, readings, f"{path}: {word}", line or 1)
     cells = frame(dict(zip(names, zip(*(c for _, c in readings), strict=True), strict=True)))
     units = {name: str(unit) for name, unit in zip(names, under, strict=False)}
-    label = [str(filled(first)[0]).strip()[:30] for first in aside.values()][:1]
+    row_names = RowNames(word=word)
+    notes = [f"{row_names.spans(aside)}: not read ({str(filled(first)[0]).strip()[:30]})"
+             for first in [*aside.values()][:1]]  # fmt: skip
     return RawTable(
         path,
         cells,
@@ -111,8 +113,8 @@ def tabled(path: str, rows: Iterable[Row], layout: Layout, sheet: bool = False) 
         layout.decimal,
         layout.thousands,
         units | _units_behind(cells, units),
-        tuple(f"{RowNames(word=word).spans(aside)}: not read ({text})" for text in label),
-        RowNames(word=word),
+        tuple(notes),
+        row_names,
     )
 
 

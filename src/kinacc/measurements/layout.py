@@ -133,7 +133,7 @@ def find(
     that must be there, of ``JOINTS`` and ``POSITION``.
     """
     finder = _Finder(table, layout, prismatic, problems)
-    before, numbers = len(problems), range(1, len(prismatic) + 1)
+    numbers = range(1, len(prismatic) + 1)
     joints = finder.group([f"q{n}" for n in numbers], JOINTS in need)
     commanded = finder.group([f"q{n}_cmd" for n in numbers])
     if len(prismatic) and finder.place(spare := f"q{len(prismatic) + 1}"):
@@ -161,7 +161,7 @@ def find(
         (*mass, *centre) if mass else (),
     )
     uses = Counter(place.column for place in columns.measured())
-    for column in (column for column in uses if uses[column] > 1 and len(problems) == before):
+    for column in (column for column in uses if uses[column] > 1 and not problems):
         mapped = ", ".join(name for name, source in layout.columns.items() if source == column)
         message = f"is taken for {uses[column]} quantities, {mapped} among them"
         finder.problem(column, message, "one", "correct measurements.file.columns")

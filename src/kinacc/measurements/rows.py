@@ -165,5 +165,5 @@ def _open(
     guess = described(looked, answers, need)
     named = [f"{ours} is {name}" for ours, name in guess.section["columns"].items()
              if name.removeprefix(ours)[:1] not in ("", "_")]  # fmt: skip
-    notes = (*guess.notes, *guess.assumed.values(), *([", ".join(named)] if named else []))
+    notes = (*guess.notes, *guess.assumed.values(), *filter(None, [", ".join(named)]))
     return guess.table, Layout.of(guess.section), notes

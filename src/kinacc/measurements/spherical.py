@@ -88,7 +88,7 @@ def directions_of(
         meant = {u: f"{turn:g} is {np.rad2deg(turn * PER_UNIT[u]):.4g} degrees" for u in PER_UNIT}
         about = f"{horizontal} and {vertical} state no unit of angles"
         choices.append(Choice("--direction-unit", about, meant))
-    values = np.concatenate([table.values(reading.vertical.column) for reading in readings])
+    values = table.values(vertical)
     quarter = 0.5 * np.pi / PER_UNIT.get(unit, PER_UNIT["deg"])
     low, high, terms = np.nanmin(values), np.nanmax(values), {*first.vertical.terms}
     zero = answers.get("vertical")

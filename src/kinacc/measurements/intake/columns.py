@@ -144,9 +144,8 @@ class _Choice:
             self.take |= {group.names[0] for group in nominal}
         # Whether a column by itself is a deviation: error, 3D deviation.
         grouped = {column for group in self.every for column in group.names}
-        self.off = any(role(n.terms) == DEVIATION and n.unit not in ANGLE
-                       and not WORDS["external"] & {*n.terms}
-                       for n in self.names if n.column not in grouped)  # fmt: skip
+        self.off = any(role(name.terms) == DEVIATION and name.unit not in ANGLE
+                       for name in self.names if name.column not in grouped)  # fmt: skip
         self.questions: list[Choice] = []
 
     def _of(self, kind: str, *roles: str) -> list[Group]:
@@ -192,7 +191,6 @@ class _Choice:
         """The joints as commanded beside ``joints``, where there is one such group."""
         fit = [g for g in self._of(JOINTS, NOMINAL) if joints and g is not joints
                and len(g.columns) == len(joints.columns) and g.units == joints.units]  # fmt: skip
-        fit = [g for g in fit if not {"target", "ref"} & {*g.terms}] or fit
         return fit[0] if len(fit) == 1 else None
 
     def points(self, joints: Group | None) -> list[Group]:
