@@ -170,13 +170,14 @@ def later(folder, tmp_path_factory):
     off, every = held_out_mm(found), measured[JOINTS].to_numpy()
     arm = calibration(read_tables(found))
 
-    def write(grown: float, count: int, offset_rad=0.0, times=1, known=0):
+    def write(grown: float, count: int, offset_rad=0.0, times=1, known=0, wrong=()):
         rng = np.random.default_rng(5)
         middle = every.mean(axis=0)  # drawn towards it: measured there
         q_rad = middle + 0.6 * (every[rng.integers(len(every), size=count)] - middle)
         q_rad += rng.normal(0.0, 0.01, q_rad.shape)
         seen = predict(arm, q_rad, frame="instrument").pose.position_mm
         seen = seen + grown * off[rng.integers(len(off), size=count)]
+        seen[list(wrong), 0] += 5.0
         q_rad[:, 2] += offset_rad
         rows = np.tile(np.hstack([q_rad, seen]), (times, 1))
         rows = np.vstack([rows, measured[JOINTS + XYZ_MM][:known]])
@@ -222,6 +223,15 @@ def test_a_joint_that_lost_its_zero_is_named(folder, later):
     assert answer["verdict"] == "fail"
     assert answer["test"]["joint"] == 3
     assert answer["test"]["offset"] == pytest.approx(-1.5, rel=0.4)  # less than is reported
+
+
+@pytest.mark.parametrize("how", [SAME, MOVED])
+def test_one_wrong_reading_does_not_pass_among_good_ones(folder, later, how):
+    answer = answered(folder[1], later(1.0, 20, wrong=[7]), *how)
+    assert answer["verdict"] == "undecided"
+    assert answer["test"]["probability"] > 0.01
+    assert "line 9 " in answer["reason"]
+    assert answered(folder[1], later(1.0, 20), *how)["verdict"] == "pass"
 
 
 def test_too_few_configurations_that_are_no_worse_pass_nothing(folder, later):

@@ -19,6 +19,7 @@ from kinacc.calibration.observations import Observations, from_columns
 from kinacc.calibration.residuals import errors
 from kinacc.calibration.summary import LARGE_SHARE, held_out_errors
 from kinacc.calibration.tables import frames_of
+from kinacc.checks import tails
 from kinacc.config.error_models import ERROR_MODELS, MEASURED, NOMINAL, Comparison
 from kinacc.deployment import folder
 from kinacc.deployment.applicability import frame_motions, is_measured_there
@@ -38,6 +39,7 @@ from kinacc.kinematics.model import ErrorModel
 from kinacc.kinematics.robot import Robot, carried
 from kinacc.kinematics.tables import models
 from kinacc.measurements.folds import configurations
+from kinacc.measurements.row_names import RowNames
 from kinacc.tables.columns import Columns, Tables
 
 BASE, TOOL = "base", "tool"
@@ -159,16 +161,42 @@ def verify(
     if fresh.columns[..., -1].size <= fresh.rank:
         return replace(result, reason="base and tool explain all that these poses show")
     test, (factor, offsets) = compare(held_out, fresh), smallest_changes(held_out, len(rows))
-    verdict = FAIL if test.probability <= LEVEL else PASS if factor <= DOUBLED else UNDECIDED
-    few = f"{len(rows)} configurations near measured poses are too few to show errors "
-    few += f"{DOUBLED:g} times as large; measure more"
+    verdict = FAIL if test.probability <= LEVEL else PASS
+    reason = _far_off(columns["row"][~is_known][rows.ravel()], off_mm, held_out, columns)
+    if not reason and factor > DOUBLED:
+        reason = f"{len(rows)} configurations near measured poses are too few to show errors "
+        reason += f"{DOUBLED:g} times as large; measure more"
+    if verdict == FAIL:
+        reason = ""
+    elif reason:
+        verdict = UNDECIDED
     return replace(
         result,
         verdict=verdict,
-        reason=few if verdict == UNDECIDED else "",
+        reason=reason,
         test=test,
         smallest_factor=factor,
         smallest_offsets=offsets,
+    )
+
+
+def _far_off(
+    lines: np.ndarray, off_mm: np.ndarray, held_out: ErrorColumns, columns: Columns
+) -> str:
+    """That new readings err by more than held-out errors let expect of so many; empty if none do.
+
+    One wrong reading among sound ones is in the random samples of the test as well, which
+    therefore does not show it.
+    """
+    sizes_mm = np.linalg.norm(off_mm, axis=1)
+    known_mm = np.linalg.norm(held_out.columns[..., -1].reshape(-1, 3), axis=1)
+    limit_mm = tails.limit(known_mm, 3, len(sizes_mm))
+    if not (count := int(np.sum(sizes_mm > limit_mm))):
+        return ""
+    worst = RowNames.of_columns(columns).one(lines[np.argmax(sizes_mm)])
+    return (
+        f"{count} of {len(sizes_mm)} readings err by more than held-out errors let expect "
+        f"({limit_mm:.3g} mm), most {worst} ({sizes_mm.max():.3g} mm); read again or leave out"
     )
 
 
