@@ -148,7 +148,10 @@ def _compared(
         row |= _sizes("in_force", _errors_mm(force, session, moved, weight))
         for item in (force, session):
             if _count(item.observations) < LEAST_HELD_OUT:
-                message = f"fewer than {LEAST_HELD_OUT} configurations in {item.name}"
+                message = (
+                    f"fewer than {LEAST_HELD_OUT} configurations in {item.name}: measure more, or "
+                    "take it out of the series"
+                )
                 return row | {"verdict": OPEN, "reason": message}
         return row | _change(force, session, moved, weight, level)
     except (FitError, InputError) as problem:
