@@ -6,8 +6,9 @@ import math
 
 import numpy as np
 import pytest
+import scipy.stats
 
-from kinacc.assess.limits import LowerAverage, boundary, clip_of, look_counts
+from kinacc.assess.limits import EARLY, LATE, LowerAverage, boundary, clip_of, look_counts
 
 ERROR, WALKS = 0.05, 200_000
 CLOSE = 4.0 * np.sqrt(ERROR * (1.0 - ERROR) / WALKS)  # four standard deviations of a share
@@ -72,3 +73,10 @@ def test_the_lower_bound_is_false_exactly_as_often_as_allowed_whatever_is_chosen
     assert np.mean(bounds > 1.0) == pytest.approx(ERROR, abs=near)
     less = lower_bounds(24, 5000, np.random.default_rng(3), factor=0.9)
     assert np.mean(less > 1.0) > ERROR + near
+
+
+def test_a_look_at_estimated_noise_is_as_wide_as_students_quantile_of_its_share():
+    counts = np.array([1, 3, 9])
+    looks = boundary(tuple(counts), ERROR, 6.0)
+    spent = ERROR * (EARLY + (1.0 - EARLY) * (counts / 9) ** LATE)
+    assert scipy.stats.t.sf(looks.alone, 6.0) == pytest.approx(np.diff(spent, prepend=0.0))

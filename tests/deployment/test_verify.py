@@ -53,6 +53,12 @@ def test_a_single_configuration_is_expected_to_err_as_the_median_one():
     assert found.expected_mm == pytest.approx(8.0)
 
 
+def test_a_fit_to_the_new_errors_is_undone_by_its_degrees_of_freedom():
+    new = heavy_tailed(np.random.default_rng(1), 4, True)
+    found = compare(new._replace(columns=new.columns[:0]), new)  # each sample is all of the new
+    assert found.expected_mm == pytest.approx(found.rms_mm / np.sqrt(1.0 - 3 / 12))
+
+
 def test_changes_of_the_stated_sizes_are_found_in_four_of_five_cases():
     found = np.zeros((3, 40, 2))
     for seed in range(3):
