@@ -498,7 +498,8 @@ def compare(
     Parameters
     ----------
     first, second
-        Two calibrations.
+        Two calibrations. VEC models have no test; the command compares DH models, as
+        ``load_calibration(folder, "dh")`` reads them.
     q_rad
         (n, k) reported joints, rad (mm where a joint slides), at which poses are compared; all
         measured ones where not given.
