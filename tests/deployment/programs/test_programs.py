@@ -15,7 +15,7 @@ from read_columns import Q_DEG
 from scipy.spatial.transform import Rotation
 from shared_data import EXAMPLES
 
-from kinacc.deployment.programs import abb, compensate_program, kuka, read_program
+from kinacc.deployment.programs import abb, compensate_program, kuka, read_program, yaskawa
 from kinacc.deployment.programs.orientation import (
     FIXED,
     INTRINSIC,
@@ -383,3 +383,10 @@ def test_postures_near_singularities_are_flagged(tmp_path):
     assert clear.sum() > 50
     np.testing.assert_array_equal(flagged[clear], smallest[clear] < 0.02)
     assert 5 < flagged.sum() < 40
+
+
+def test_turns_of_a_yaskawa_posture_are_those_of_r_t_and_s():
+    usual = yaskawa.posture((True, True, False), np.zeros(6))
+    for axis, places in ((3, {0, 3}), (5, {4}), (0, {5})):  # R beyond 90 degrees also flips
+        other = yaskawa.posture((True, True, False), 200.0 * (np.arange(6) == axis))
+        assert {place for place in range(6) if usual[place] != other[place]} == places
