@@ -183,10 +183,10 @@ def verify(
 def _far_off(
     lines: np.ndarray, off_mm: np.ndarray, held_out: ErrorColumns, columns: Columns
 ) -> str:
-    """That new readings err by more than held-out errors let expect of so many; empty if none do.
+    """Readings whose errors exceed the limit of held-out errors, in words; empty if none do.
 
-    One wrong reading among sound ones is in the random samples of the test as well, which
-    therefore does not show it.
+    The permutation test does not detect one wrong reading among sound ones: its random samples
+    contain that reading too.
     """
     sizes_mm = np.linalg.norm(off_mm, axis=1)
     known_mm = np.linalg.norm(held_out.columns[..., -1].reshape(-1, 3), axis=1)
@@ -195,8 +195,8 @@ def _far_off(
         return ""
     worst = RowNames.of_columns(columns).one(lines[np.argmax(sizes_mm)])
     return (
-        f"{count} of {len(sizes_mm)} readings err by more than held-out errors let expect "
-        f"({limit_mm:.3g} mm), most {worst} ({sizes_mm.max():.3g} mm); read again or leave out"
+        f"errors of {count} of {len(sizes_mm)} readings exceed the limit of held-out errors, "
+        f"{limit_mm:.3g} mm; largest: {worst}, {sizes_mm.max():.3g} mm; measure again"
     )
 
 
