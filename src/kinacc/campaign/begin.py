@@ -81,11 +81,14 @@ def points_of(
     joints, names = joints[rows], [str(label[i]).strip() for i in rows]
     directions = None if directions is None else directions[rows]
     robot, limits = arm.robot, (arm.robot.q_min_rad, arm.robot.q_max_rad)
-    beyond = outside(joints, limits) | outside(robot.dh_joints(joints), arm.model.domain)
-    message = f"outside the limits of {robot.name}, or the range of the data"
+    beyond = {
+        f"the limits of {robot.name}": outside(joints, limits),
+        "the joint range of the data": outside(robot.dh_joints(joints), arm.model.domain),
+    }
     problems = [
-        Problem(f"candidates {first_few([*compress(names, far)])}", f"joint {joint} {message}")
-        for joint, far in enumerate(beyond.T, 1)
+        Problem(f"candidates {first_few([*compress(names, far)])}", f"joint {joint} outside {what}")
+        for what, rows_beyond in beyond.items()
+        for joint, far in enumerate(rows_beyond.T, 1)
         if far.any()
     ]
     problems += [fault for name in names for fault in not_in_a_line("candidates, pose", name)]
