@@ -27,6 +27,7 @@ from kinacc.config.fields import refused
 from kinacc.config.names import not_in_a_line
 from kinacc.config.problems import by_line, problems_of
 from kinacc.config.reading import Document, KeyPath, mapping, read
+from kinacc.config.settings import ROBOTS, SHIPPED
 from kinacc.config.values import did_you_mean
 from kinacc.errors import InputError, Problem, input_error, refuse
 from kinacc.geometry import (
@@ -41,7 +42,6 @@ from kinacc.kinematics.dh import PARAMETERS, DHModel
 from kinacc.kinematics.robot import urdf as _urdf
 from kinacc.kinematics.robot.record import FEWEST_JOINTS, MOST_JOINTS, Robot
 
-_SHIPPED = Path(__file__).parents[1] / "robots"
 _LARGEST = 1e9  # of any number: beyond, nothing about an arm is meant, and products overflow
 _SHORTEST_MM = 20.0  # of all lengths together
 _LEAST_TURN_RAD = 0.11  # some joint of every arm turns further
@@ -229,7 +229,7 @@ class ByUrdf(_About):
 
 def shipped() -> list[str]:
     """Names of the robots that come with kinacc."""
-    return sorted(path.stem for path in _SHIPPED.glob("*.yaml"))
+    return [*SHIPPED]
 
 
 def load(name_or_path: str | Path) -> Robot:
@@ -298,7 +298,7 @@ def files(name_or_path: str | Path) -> list[Path]:
         For a name that is neither a shipped robot nor a file.
     """
     path = _path(name_or_path)
-    if path.parent == _SHIPPED:
+    if path.parent == ROBOTS:
         return []
     if path.suffix.lower() not in (".yaml", ".yml"):
         return [path]
@@ -310,7 +310,7 @@ def files(name_or_path: str | Path) -> list[Path]:
 def _path(name_or_path: str | Path) -> Path:
     name = str(name_or_path)
     if name in shipped():
-        return _SHIPPED / f"{name}.yaml"
+        return ROBOTS / f"{name}.yaml"
     if os.path.isfile(name):  # false, too, for a name no file can have
         return Path(name)
     allowed = "a name listed in docs/robots.md, or the path of a robot YAML or URDF"
