@@ -101,8 +101,8 @@ def accuracy_map(robot: Robot, models: Models, cells: Cells, wanted: PosesWanted
     within the joint limits and within the range of the reference, of ``wanted``; only those enter
     the maxima, since beyond its range it says nothing. ``extrapolating`` counts the combinations
     left out for that reason alone. ``q1`` .. are the reported joints of the largest position error.
-    Cells without a solution
-    have no maxima, joints and branches, which read ``X+ Y- Z0, front-up-flip``.
+    Cells without a solution have no maxima, joints and branches; a branch reads
+    ``X+ Y- Z0, front-up-flip``.
     """
     blocks = range(0, len(cells.radius_mm), _CELLS_PER_BLOCK)
     parts = [

@@ -134,7 +134,7 @@ def outdated_reason(folder: Path | str) -> str:
         paths = [path for path, _ in known]
     elif paths := [path for path, is_other in known if is_other]:
         made_by = [path for path, is_other in known if not is_other]
-        by = f", which those of {made_by[0]} made" if made_by else ""
+        by = f" (made with {made_by[0]})" if made_by else ""
         reason = f"{paths[0]} has other settings than the calibration{by}"
     else:
         return ""
