@@ -19,7 +19,7 @@ rule figures:
     conda:
         "../envs/kinacc.yaml"
     params:
-        **job("figures.py", "seed robot", shown=True, evaluation="space cylinder tool_mm travel_direction", measurements="source"),
+        **job("figures.py", "seed robot", shown=True, evaluation="space cylinder tool_mm travel_direction"),
     message:
         "{wildcards.dataset}: drawing Figs. 1, 2, 4, 5 and 6"
     script:
