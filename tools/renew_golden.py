@@ -20,7 +20,6 @@ import cases
 
 from kinacc.deployment.export.files import contents
 from kinacc.deployment.export.source import read_source
-from kinacc.deployment.folder import recorded_robot
 from kinacc.tables.comparison import compare_folders
 
 
@@ -66,9 +65,8 @@ def renew_exports() -> None:
     """Exports of the UR10: the DH model in all formats, the VEC model as JSON."""
     folder = cases.GOLDEN / "exports"
     folder.mkdir(exist_ok=True)
-    robot = recorded_robot(cases.RESULTS / "ur10_d")
     for model, formats in (("dh", ("yaml", "json", "csv", "urdf")), ("vec", ("json",))):
-        made = contents(read_source(cases.RESULTS / "ur10_d", robot, model), formats)
+        made = contents(read_source(cases.RESULTS / "ur10_d", model), formats)
         for name, text in made.items():
             (folder / name).write_text(text)
 
