@@ -53,7 +53,7 @@ lint: $(KINACC) $(TOOLS)
 	$(PY) -m ruff check .
 	$(PY) -m ruff format --check .
 	.venv/bin/lint-imports --no-cache --no-logo
-	$(PY) -m mypy
+	$(PY) -m mypy -n $(CORES)
 
 check: lint
 	$(PYTEST) -m "not slow and not night"
