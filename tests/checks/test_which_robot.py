@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from good_files import simulated
 
-from kinacc.checks.meanings import Meaning
+from kinacc.checks.meanings import read_as
 from kinacc.checks.readings import of_file
 from kinacc.kinematics import robot
 from kinacc.measurements.reader import read
@@ -30,6 +30,6 @@ def test_the_arm_that_was_measured_fits_best_of_those_nearest_in_size(name, tmp_
     misfits = {}
     for other in rivals[:12]:
         seen = replace(measured, q_rad=ARMS[other].dh_joints(measured.q))
-        misfits[other] = Meaning.of(seen, ARMS[other], ()).misfit
+        misfits[other] = read_as(seen, ARMS[other], [()])[0].misfit
     best = min(misfits, key=misfits.get)
     assert best == name or {best, name} in ALIKE

@@ -313,6 +313,7 @@ def left_jacobians(w_rad: np.ndarray) -> np.ndarray:
 
 
 _START_RCOND = 1e-3  # weaker directions of the start are left at zero for the fit to find
+_TINY_MM = 1e-12
 _LEVER_MM = 100.0  # one radian of orientation counts as much as a point this far away
 
 
@@ -345,7 +346,8 @@ def closed_form_start(observations: Observations, flange: Pose) -> Frames:
         if seen.any():
             base = base_from_targets(part.select(seen), at.select(seen), start.targets)
         else:
-            base = one_session(part, at)[0]
+            carried, every = np.eye(names)[part.target], np.ones((1, len(part)))
+            base = one_session(part.measured, carried, at, every)[0].select(0)
         start.bases.rotation[session], start.bases.position_mm[session] = base
         in_base = (part.position_mm - base.position_mm) @ base.rotation - at.position_mm
         points = np.einsum("nji,nj->ni", at.rotation, in_base)
@@ -360,8 +362,10 @@ def closed_form_start(observations: Observations, flange: Pose) -> Frames:
     return start
 
 
-def one_session(observations: Observations, flange: Pose) -> tuple[Pose, np.ndarray]:
-    """Base and positions of targets from the rows of one session.
+def one_session(
+    measured: Pose, carried: np.ndarray, flange: Pose, weight: np.ndarray
+) -> tuple[Pose, np.ndarray]:
+    """Base and positions of targets from the rows of one session, for each of B sets of rows.
 
     Linear solutions for the base rotation, the one that leaves the smallest position error: from
     positions with a free 3x3 matrix, C m - R_flange t + c = p_flange, which fails where they lie in
@@ -371,52 +375,71 @@ def one_session(observations: Observations, flange: Pose) -> tuple[Pose, np.ndar
 
     Parameters
     ----------
-    observations : Observations
-        n measured points and poses of one session.
+    measured : Pose
+        n rotations in the instrument's frame, NaN where not measured, and positions of shape
+        (n, 3) or (B, n, 3), mm.
+    carried : numpy.ndarray
+        One where a row is of a target and zero elsewhere, shape (n, T).
     flange : Pose
-        Flange poses in the robot base, shape (n, ...), mm.
+        Flange poses in the robot base, shape (n, ...) or (B, n, ...), mm.
+    weight : numpy.ndarray
+        One for the rows of a set and zero for others, shape (B, n).
 
     Returns
     -------
     base : Pose
-        Robot base in the instrument's frame, mm.
+        Robot bases in the instrument's frame, shape (B, ...), mm.
     points : numpy.ndarray
-        Targets in the flange frame, shape (T, 3), mm; zero for targets that were not measured.
+        Targets in the flange frame, shape (B, T, 3), mm; zero for targets that were not measured.
     """
-    count, targets = len(observations), len(observations.target_names)
-    carried = np.eye(targets)[observations.target]
-    levers = np.einsum("nij,nt->nitj", flange.rotation, carried).reshape(count, 3, -1)
-    centred = observations.position_mm - observations.position_mm.mean(axis=0)
-    centred = centred / (np.abs(centred).max() or 1.0)
-    free = np.einsum("ab,nj->nabj", np.eye(3), centred).reshape(3 * count, 9)
-    constant, system = np.tile(np.eye(3), (count, 1)), -levers.reshape(3 * count, -1)
-    system = np.hstack([free, constant, system])
-    solution = _solved(system, flange.position_mm.ravel())
-    rotations = [_nearest_rotation(solution[:9].reshape(3, 3)).T]
-    for target in np.unique(observations.target[observations.has_rotation]):
-        rows = observations.has_rotation & (observations.target == target)
-        # vec(base) is proportional to sum(flange (x) measured) vec(tool'), vec by columns.
-        kron = np.einsum("nij,nkl->ikjl", flange.rotation[rows], observations.rotation[rows])
-        base = np.linalg.svd(kron.reshape(9, 9))[0][:, 0].reshape(3, 3).T
-        rotations.append(_nearest_rotation(base if np.linalg.det(base) > 0 else -base))
+    sets, count = weight.shape
+    share, used = (weight / weight.sum(axis=1, keepdims=True))[:, None], weight[:, :, None]
+    levers = np.einsum("...nij,nt->...nitj", flange.rotation, carried)
+    levers = levers.reshape(-1, count, 3, levers.shape[-2] * 3)
+    centred = measured.position_mm - share @ measured.position_mm
+    largest = np.abs(used * centred).max(axis=(1, 2), keepdims=True)
+    centred = np.pad(centred / np.maximum(largest, _TINY_MM), ((0, 0), (0, 0), (0, 1)))
+    centred[:, :, 3] = 1.0
+    free = np.einsum("ab,snj->snabj", np.eye(3), centred).reshape(sets, 3 * count, -1)
+    system = np.broadcast_to(-levers, (sets, *levers.shape[1:])).reshape(sets, 3 * count, -1)
+    system = np.concatenate([free, system], axis=2)
+    solution = _solved(system, flange.position_mm.reshape(-1, 3 * count), weight)
+    rotations = [_nearest_rotation(np.swapaxes(solution[:, :12].reshape(-1, 3, 4), 1, 2)[:, :3])]
+    for rows in (carried.T > 0.0) & np.isfinite(measured.rotation[:, 0, 0]):
+        if rows.any():
+            # vec(base) is proportional to sum(flange (x) measured) vec(tool'), vec by columns.
+            turns = used[:, rows, :, None] * flange.rotation[..., rows, :, :]
+            kron = np.einsum("snij,nkl->sikjl", turns, measured.rotation[rows])
+            base = np.linalg.svd(kron.reshape(-1, 9, 9))[0][:, :, 0].reshape(-1, 3, 3)
+            sign = np.sign(np.linalg.det(base))[:, None, None]
+            rotations.append(_nearest_rotation(sign * np.swapaxes(base, 1, 2)))
     starts = []
     for rotation in rotations:  # once the base is turned, positions are linear
-        design = rotation @ levers
-        goal = observations.position_mm - flange.position_mm @ rotation.T
+        design = (rotation[:, None] @ levers).reshape(sets, count, -1)
+        goal = measured.position_mm - flange.position_mm @ np.swapaxes(rotation, 1, 2)
         # Centred, so that what the turns cannot show of a target is left at zero.
-        system = (design - design.mean(axis=0)).reshape(3 * count, -1)
-        points = _solved(system, (goal - goal.mean(axis=0)).ravel())
-        rest = goal - design @ points
-        position = rest.mean(axis=0)
-        misfit = float(np.sum((rest - position) ** 2))
-        starts.append((misfit, Pose(rotation, position), points.reshape(targets, 3)))
-    return min(starts, key=lambda start: start[0])[1:]
+        system = (design - share @ design).reshape(sets, 3 * count, -1)
+        points = _solved(system, (goal - share @ goal).reshape(sets, -1), weight)
+        rest = goal - (rotation[:, None] @ levers @ points[:, None, :, None])[..., 0]
+        position = share @ rest
+        misfit = np.sum(used * (rest - position) ** 2, axis=(1, 2))
+        starts.append((rotation, position[:, 0], points.reshape(sets, -1, 3), misfit))
+    turn, position, points, _ = least(starts)
+    return Pose(turn, position), points
 
 
-def _solved(system: np.ndarray, right: np.ndarray) -> np.ndarray:
+def least(found: Sequence[tuple[np.ndarray, ...]]) -> list[np.ndarray]:
+    """Of arrays (B, ...) found in several ways, those of the way whose last is least, each set."""
+    columns = [np.stack(column) for column in zip(*found, strict=True)]
+    best = np.argmin(columns[-1], axis=0)
+    return [column[best, np.arange(len(best))] for column in columns]
+
+
+def _solved(system: np.ndarray, right: np.ndarray, weight: np.ndarray) -> np.ndarray:
     """Least squares by normal equations, weak directions left at zero: enough for a start."""
-    gram = np.linalg.pinv(system.T @ system, rcond=_START_RCOND**2, hermitian=True)
-    return gram @ (system.T @ right)
+    used = np.swapaxes(system * np.repeat(weight, 3, axis=1)[:, :, None], 1, 2)
+    gram = np.linalg.pinv(used @ system, rcond=_START_RCOND**2, hermitian=True)
+    return (gram @ (used @ right[:, :, None]))[:, :, 0]
 
 
 def base_from_targets(observations: Observations, flange: Pose, targets: Pose) -> Pose:
@@ -453,5 +476,5 @@ def base_from_targets(observations: Observations, flange: Pose, targets: Pose) -
 
 def _nearest_rotation(matrix: np.ndarray) -> np.ndarray:
     left, _, right = np.linalg.svd(matrix)
-    left[:, 2] *= np.sign(np.linalg.det(left @ right))
+    left[..., 2] *= np.sign(np.linalg.det(left @ right))[..., None]
     return left @ right

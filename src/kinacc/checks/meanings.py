@@ -10,23 +10,23 @@ they scatter tells the right reading of the orientations from a wrong one, witho
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from itertools import chain, combinations, product
 from typing import TypeVar
 
 import numpy as np
-import pandas as pd
 from numpy import ndarray
 from scipy.spatial.transform import Rotation
 
+from kinacc.calibration.frames import stacked
 from kinacc.checks import changes, robust_fit
 from kinacc.checks.changes import Change
 from kinacc.checks.findings import Finding
 from kinacc.checks.readings import Readings, thinned
 from kinacc.checks.robust_fit import Trial
 from kinacc.config.measured import Orientation
-from kinacc.geometry import compose, invert
+from kinacc.geometry import Pose, compose, invert
 from kinacc.kinematics import dh
 from kinacc.kinematics.robot import Robot
 from kinacc.progress import with_progress
@@ -70,26 +70,37 @@ class Meaning:
     flange: ndarray
     misfit: float
 
-    @classmethod
-    def of(cls, few: Readings, robot: Robot, applied: Changes) -> Meaning:
-        """The meaning of a few readings under changes that are ``applied`` one after the other."""
-        read = changed(few, applied)
-        positions = replace(read, rotation=np.full_like(read.rotation, np.nan))
-        by_arm = dh.forward(robot.dh, read.q_rad)
-        _, base, points = robust_fit.placed(positions, by_arm, [np.arange(len(read))])
-        flange = compose(base, by_arm)
-        if len(points) > 1:  # a part of the readings may be of another target than they say
-            there = compose(invert(flange), read.measured).position_mm
-            medians = pd.DataFrame(there).groupby(read.target).median()
-            points[medians.index] = medians.to_numpy()
-        length = robust_fit.distances(read, by_arm, base, points)
-        misfit = float(np.quantile(length, _MAJORITY)) / max(spread_mm(read.position_mm), 1e-12)
-        return cls(applied, read, flange.rotation, misfit)
-
     @property
     def scatter_rad(self) -> float:
         """Scatter of the orientations seen from the flange, placed by the positions alone."""
         return scatter(self.flange, self.read)
+
+
+def read_as(few: Readings, robot: Robot, ways: Sequence[Changes]) -> list[Meaning]:
+    """The meanings of a few readings under each of ``ways``: changes one after the other."""
+    read = [changed(few, applied) for applied in ways]
+    by_arm = stacked([dh.forward(robot.dh, item.q_rad) for item in read])
+    found = placed(few, by_arm, np.stack([item.position_mm for item in read]))
+    return [Meaning(*item) for item in zip(ways, read, *found, strict=True)]
+
+
+def placed(few: Readings, by_arm: Pose, position_mm: ndarray) -> tuple[ndarray, ndarray]:
+    """Base and target alone, fitted to each of B sets of flanges and positions (B, n, 3).
+
+    Turns (B, n, 3, 3) of the flange in the instrument's frame, and misfits (B,) as shares of the
+    points' spread.
+    """
+    measured = Pose(np.full_like(few.rotation, np.nan), position_mm)
+    every = np.ones(position_mm.shape[:2])
+    _, *base, points, _ = robust_fit.placed(few, measured, by_arm, every)
+    flange = compose(Pose(*(part[:, None] for part in base)), by_arm)
+    if len(few.target_names) > 1:  # a part of the readings may be of another target than they say
+        there = compose(invert(flange), measured).position_mm
+        for target in np.unique(few.target):
+            points[:, target] = np.median(there[:, few.target == target], axis=1)
+    length = robust_fit.distances(few.target, measured, by_arm, Pose(*base), points)
+    share = np.quantile(length, _MAJORITY, axis=1) / np.maximum(spread_mm(position_mm), 1e-12)
+    return flange.rotation, share
 
 
 def changed(read: Readings, applied: Iterable[Change]) -> Readings:
@@ -106,11 +117,11 @@ def find(read: Readings, robot: Robot, written: Trial) -> tuple[Readings, list[F
     """
     # One session: each has its own base, and a meaning holds for all of them.
     part = largest_session(read, np.arange(len(read)))
-    spread = spread_mm(part.position_mm)
+    spread = float(spread_mm(part.position_mm))
     if len(np.unique(part.pose)) < _FEWEST or spread == 0.0:
         return read, []
     few = part.select(thinned(np.arange(len(part)), _TRIED_ROWS))
-    here = Meaning.of(few, robot, ())
+    (here,) = read_as(few, robot, [()])
     tried = _searched(here, robot, written.sigma_mm < _GOOD * spread)
     best = min(item.misfit for item in tried)
     if not best < _PROMISING * here.misfit:
@@ -155,9 +166,9 @@ def find_by_turns(
     """
     part = largest_session(read, np.flatnonzero(read.has_rotation))
     few = part.select(thinned(np.arange(len(part)), _TURNED_ROWS))
-    here = Meaning.of(few, robot, ())
+    single = ((change,) for change in changes.joint_changes(robot))
+    here, *rivals = read_as(few, robot, [(), *single])
     limit = _AS_GOOD * max(here.misfit, _SHOWN)
-    rivals = (Meaning.of(few, robot, (change,)) for change in changes.joint_changes(robot))
     tried = [(item.scatter_rad, item) for item in rivals if item.misfit < limit]
     if not tried:
         return None
@@ -227,10 +238,10 @@ def _angles(turns: Rotation) -> ndarray:
     return angle
 
 
-def spread_mm(points: ndarray) -> float:
-    """Root of the median squared distance of points (n, 3) from their middle."""
-    centred = points - np.median(points, axis=0)
-    return float(np.sqrt(np.median(np.sum(centred**2, axis=1))))
+def spread_mm(points: ndarray) -> ndarray:
+    """Root of the median squared distance of points (..., n, 3) from their middle."""
+    centred = points - np.median(points, axis=-2, keepdims=True)
+    return np.sqrt(np.median(np.sum(centred**2, axis=-1), axis=-1))
 
 
 def largest_session(read: Readings, rows: ndarray) -> Readings:
@@ -256,10 +267,12 @@ def _searched(here: Meaning, robot: Robot, good: bool) -> list[Meaning]:
     tried = {_numbers(here.read): here}
     single = [(change,) for change in changes.joint_changes(robot)]
     for rivals in [single] if good else _rounds(here, robot, tried):
-        for applied in with_progress(rivals, "ways to read the columns tried"):
-            # A meaning that comes again keeps the fewest changes.
-            if (numbers := _numbers(changed(here.read, applied))) not in tried:
-                tried[numbers] = Meaning.of(here.read, robot, applied)
+        ways: dict[bytes, Changes] = {}
+        for applied in rivals:  # a meaning that comes again keeps the fewest changes
+            ways.setdefault(_numbers(changed(here.read, applied)), applied)
+        new = {numbers: ways[numbers] for numbers in ways if numbers not in tried}
+        if new:
+            tried.update(zip(new, read_as(here.read, robot, [*new.values()]), strict=True))
         if not good and min(item.misfit for item in tried.values()) < _SURE:
             break
     return [*tried.values()]

@@ -21,11 +21,12 @@ from kinacc.calibration.frames import (
     Frames,
     closed_form_start,
     frame_terms,
+    least,
     one_session,
 )
 from kinacc.checks import tails
 from kinacc.checks.readings import Readings, thinned
-from kinacc.geometry import IDENTITY, Pose, compose, log_so3
+from kinacc.geometry import Pose, compose, log_so3
 from kinacc.kinematics import dh
 from kinacc.kinematics.dh import DHModel
 
@@ -302,14 +303,16 @@ def start(observed: Readings, model: DHModel) -> Arm:
     session = np.argmax(np.bincount(observed.session))
     largest = thinned(np.flatnonzero(observed.session == session), _START_ROWS)
     part = observed.select(largest)
-    flange, every = dh.forward(model, part.q_rad), np.arange(len(part))
-    poses, rng, pieces = np.unique(part.pose), np.random.default_rng(0), [every]
+    poses, rng, every = np.unique(part.pose), np.random.default_rng(0), np.arange(len(part))
+    pieces = [every]
     if len(poses) > _DRAWN:
         stretches = [piece for count in _STRETCHES for piece in np.array_split(every, count)]
         pieces += [piece for piece in stretches if len(np.unique(part.pose[piece])) >= _DRAWN]
         draws = [rng.choice(poses, _DRAWN, replace=False) for _ in range(_DRAWS)]
         pieces += [np.flatnonzero(np.isin(part.pose, draw)) for draw in draws]
-    chosen = placed(part, flange, pieces)[0]
+    weight = np.stack([np.isin(every, piece) for piece in pieces]).astype(float)
+    weight, *_, middle = placed(part, part.measured, dh.forward(model, part.q_rad), weight)
+    chosen = weight[np.argmin(middle)] > 0.0
     # Other sessions, and targets that the chosen rows lack, are placed by the better half of each.
     rows = np.append(largest[chosen], np.flatnonzero(observed.session != session))
     flange, group = dh.forward(model, observed.q_rad), [observed.session, observed.target]
@@ -322,27 +325,35 @@ def start(observed: Readings, model: DHModel) -> Arm:
 
 
 def placed(
-    observed: Readings, flange: Pose, pieces: list[ndarray]
-) -> tuple[ndarray, Pose, ndarray]:
-    """Rows, base and targets (T, 3) of the closed form that fits the better two fifths best.
+    observed: Readings, measured: Pose, flange: Pose, weight: ndarray
+) -> tuple[ndarray, ...]:
+    """The closed form that fits the better two fifths of the readings best, for each of B sets.
 
-    Of one session; of every piece (rows), and then of the half of all readings nearest to it.
+    Of one session; of the rows of a set, and then of the half of all readings nearest to it. Shapes
+    as ``one_session`` has them.
+
+    Returns
+    -------
+    tuple of numpy.ndarray
+        Weights (B, n) of the rows, rotations and positions of bases, positions (B, T, 3) of
+        targets, and the quantile (B,) of distances, mm.
     """
-    best, least = (pieces[0], IDENTITY, np.zeros((len(observed.target_names), 3))), np.inf
-    for rows in pieces:
-        for _ in range(_REFINEMENTS):
-            base, points = one_session(observed.select(rows), flange.select(rows))
-            distance = distances(observed, flange, base, points)
-            nearest = np.argsort(distance)
-            if (middle := distance[nearest[int(_JUDGED * len(nearest))]]) >= least:
-                break
-            best, least = (rows, base, points), middle
-            rows = nearest[: max(int(_TRUSTED * len(nearest)), _DRAWN)]
-    return best
+    carried, found = np.eye(len(observed.target_names))[observed.target], []
+    count = len(observed)
+    trusted = max(int(_TRUSTED * count), min(_DRAWN, count))
+    for _ in range(_REFINEMENTS):
+        base, points = one_session(measured, carried, flange, weight)
+        distance = distances(observed.target, measured, flange, base, points)
+        nearest = np.sort(distance, axis=1)
+        found.append((weight, *base, points, nearest[:, int(_JUDGED * count)]))
+        weight = (distance <= nearest[:, [trusted - 1]]).astype(float)
+    return tuple(least(found))
 
 
-def distances(observed: Readings, flange: Pose, base: Pose, points: ndarray) -> ndarray:
-    """Distances (n,) of positions from targets at ``points`` (T, 3) of the flanges, mm."""
-    by_arm = flange.position_mm + (flange.rotation @ points[observed.target, :, None])[..., 0]
-    predicted = by_arm @ base.rotation.T + base.position_mm
-    return np.linalg.norm(predicted - observed.position_mm, axis=1)
+def distances(
+    target: ndarray, measured: Pose, flange: Pose, base: Pose, points: ndarray
+) -> ndarray:
+    """Distances (B, n) of positions from targets at ``points`` (B, T, 3) of the flanges, mm."""
+    by_arm = flange.position_mm + (flange.rotation @ points[:, target, :, None])[..., 0]
+    predicted = by_arm @ np.swapaxes(base.rotation, 1, 2) + base.position_mm[:, None]
+    return np.linalg.norm(predicted - measured.position_mm, axis=2)

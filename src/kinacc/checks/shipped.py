@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 
-from kinacc.checks.meanings import Meaning, largest_session
+from kinacc.calibration.frames import stacked
+from kinacc.checks.meanings import largest_session, placed
 from kinacc.checks.readings import Readings, thinned
+from kinacc.kinematics import dh
 from kinacc.kinematics import robot as robots
-from kinacc.progress import with_progress
 
 _ROWS = 240
 SURE = 0.01  # of the points' spread: what an arm that is the one leaves, uncalibrated
@@ -25,11 +24,11 @@ def misfits(merged: Readings) -> list[tuple[float, str]]:
     part = largest_session(merged, np.arange(len(merged)))
     few = part.select(thinned(np.arange(len(part)), _ROWS))
     arms = [arm for arm in map(robots.load, robots.shipped()) if arm.dh.joints == few.joints]
-    shares = []
-    for arm in with_progress(arms, "shipped robots tried"):
-        observed = replace(few, q_rad=arm.dh_joints(few.q))
-        shares.append((Meaning.of(observed, arm, ()).misfit, arm.name))
-    return sorted(shares)
+    if not arms:
+        return []
+    by_arm = stacked([dh.forward(arm.dh, arm.dh_joints(few.q)) for arm in arms])
+    _, shares = placed(few, by_arm, np.stack([few.position_mm] * len(arms)))
+    return sorted(zip(shares.tolist(), [arm.name for arm in arms], strict=True))
 
 
 def fitting(merged: Readings) -> list[str]:
