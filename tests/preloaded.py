@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import atexit
 import ctypes
+import gc
 import json
 import os
 import runpy
@@ -79,6 +80,7 @@ def _serve(address: str, command: str) -> None:
     """Fork at each start, until the tests end."""
     ctypes.CDLL(None).prctl(1, signal.SIGTERM)  # PR_SET_PDEATHSIG, should they be killed
     _import_packages()
+    gc.freeze()  # a collection in a forked process would copy every page of what it has imported
 
     class Start(socketserver.StreamRequestHandler):
         def handle(self) -> None:
