@@ -25,12 +25,10 @@ FIELDS = {
 def excess_by_quad(sizes: np.ndarray, noise: np.ndarray, counts: tuple[int, ...]) -> float:
     spread = noise / np.sqrt(counts)
 
-    def above(level: float) -> float:
-        shortest = special.chndtrix(ERROR, 3, (level / spread) ** 2)
-        return 1.0 - float(np.prod(special.chndtr(shortest, 3, (sizes / spread) ** 2)))
-
     levels = np.linspace(sizes.max(), float((sizes + 6.0 * spread).max()), 401)
-    return float(integrate.simpson([above(level) for level in levels], x=levels))
+    shortest = special.chndtrix(ERROR, 3, (levels[:, None] / spread) ** 2)
+    above = 1.0 - np.prod(special.chndtr(shortest, 3, (sizes / spread) ** 2), axis=1)
+    return float(integrate.simpson(above, x=levels))
 
 
 @pytest.mark.parametrize(
@@ -55,8 +53,8 @@ def proven_slowly(sizes: np.ndarray, noise: np.ndarray, readings: int) -> float:
         test = min(special.ndtr(math.sqrt(readings) * distance - Z))
 
         def over(p: float) -> float:
-            needed = [max(2.0 * divergence(p) / d**2, 1.0 - ERROR) for d in distance]
-            return sum(needed) - readings
+            needed = np.maximum(2.0 * divergence(p) / distance**2, 1.0 - ERROR)
+            return needed.sum() - readings
 
         paid = 1.0 if over(1.0) <= 0.0 else optimize.brentq(over, ERROR, 1.0)
         return 1.0 - min(test, paid)

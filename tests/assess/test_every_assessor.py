@@ -124,10 +124,11 @@ def test_the_share_of_the_region_keeps_its_confidence(sigma):
     rng = np.random.default_rng(4)
     pool = rng.normal(size=(4000, 3)) * rng.uniform(0.1, 0.5, (4000, 1))
     truth = np.quantile(np.linalg.norm(pool, axis=1), 0.9)
-    held = np.zeros(2)
-    for draw in range(DRAWS):
-        errors = pool[rng.integers(0, 4000, 80)]
-        (said,) = conduct(RegionShare(80), drawn_world(errors, sigma, key_of(draw), 1)).statements()
+    held, ledger = np.zeros(2), Ledger(equal(80, sigma))
+    ledger.visited, ledger.spread_mm2 = list(range(80)), ledger.candidates.covariance_mm2
+    for _ in range(DRAWS):
+        ledger.mean_mm = pool[rng.integers(0, 4000, 80)] + sigma * rng.normal(size=(80, 3))
+        (said,) = RegionShare(80).state(ledger)
         held += said.upper_mm >= truth, said.lower_mm <= truth
     assert held.min() >= DRAWS * LEAST
 

@@ -15,6 +15,7 @@ from kinacc.assess.noise import (
     BESIDE_REFERENCES,
     FALSE_ALARM,
     SCATTER,
+    CampaignNoise,
     Contrasts,
     contrasts,
     estimated_factor,
@@ -246,8 +247,8 @@ def test_a_noise_that_is_not_estimated_yet_withholds_bounds_and_limits():
 )
 def test_of_the_readings_after_the_visit_but_nine_half_tell_of_the_noise(spare, margin, estimating):
     def begun(noise, **settings):
-        settings = {"references": 4, "noise": noise, **settings}
-        return SearchAndConfirm(24 + spare, **settings).begin(equal(20)).noise
+        settings = SearchAndConfirm(24 + spare, references=4, noise=noise, **settings)
+        return CampaignNoise(settings, Ledger(equal(20)), [], 20)
 
     assert begun("known").margin == margin
     assert begun("estimated").estimating == estimating

@@ -10,9 +10,8 @@ import pytest
 from scipy.integrate import quad
 from scipy.optimize import brentq, minimize
 from scipy.stats import norm
-from simulated_campaigns import away, conducted
+from simulated_campaigns import away, conducted, equal
 
-from kinacc.assess.adaptive import Candidates
 from kinacc.assess.limits import (
     boundary,
     clip_of,
@@ -124,9 +123,7 @@ def test_as_many_large_readings_as_can_be_wrong_raise_no_lower_bound():
 
 @pytest.mark.parametrize("rate", [0.001, 0.05])
 def test_more_readings_are_hardly_ever_wrong_than_are_counted_on(rate):
-    campaign = SearchAndConfirm(BUDGET, wrong_rate=rate).begin(
-        Candidates(np.tile(0.01 * np.eye(3), (POINTS, 1, 1)))
-    )
+    campaign = SearchAndConfirm(BUDGET, wrong_rate=rate).begin(equal(110))
     chances = [math.comb(BUDGET, k) * rate**k * (1.0 - rate) ** (BUDGET - k)
                for k in range(BUDGET + 1)]  # fmt: skip
     counted_on = campaign.looks.wrong

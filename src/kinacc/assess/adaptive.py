@@ -140,8 +140,12 @@ class Ledger:
         self.readings.append((point, reading, covariance))
         self._weight[point] += inverse
         self._weighted[point] += inverse @ reading
-        spread = np.linalg.inv(self._weight[point])
-        self.spread_mm2[point] = 0.5 * (spread + spread.T)
+        if point in self.unplanned:
+            spread = np.linalg.inv(self._weight[point])
+            spread = 0.5 * (spread + spread.T)
+        else:
+            spread = covariance / self.count[point]
+        self.spread_mm2[point] = spread
         self.mean_mm[point] = spread @ self._weighted[point]
         self.noise_mm[point] = math.sqrt(spread.trace() / 3.0)
 

@@ -45,7 +45,6 @@ VISITS = 0.95  # share of future visits that a bound on single visits is about
 _FAR = 300.0  # sizes over noise from which on an expansion is exact to 1e-7
 _PRODUCTS, _FEWEST, _MOST = 4000, 24, 200  # of readings with directions; directions tried first
 _KEPT, _BESIDE, _ROUNDS = 3, 12, 7  # best directions of a round, new ones about each, rounds
-_HALVINGS = 40  # of the sizes between which a limit lies: a trillionth is left
 _GROWTH = 1.25  # of the number of readings from look to look
 _SECOND = 3  # readings at the second look: a block of two tells how readings scatter
 _NEAR = 0.93  # of the last look: what comes later is left to it
@@ -217,17 +216,20 @@ def guarded_lower_mm(
 
 
 def sizes_at(along: np.ndarray, sigma: np.ndarray, clip: float, wanted: float) -> np.ndarray:
-    """Largest sizes (q,) at which the scores of every row sum to ``wanted`` or more.
+    """Largest sizes (q,) at which the scores of every row sum to ``wanted``, above -clip k.
 
-    along, sigma: (q, k). Halved until nothing is left between two sizes.
+    along, sigma: (q, k). The sum falls from clip k, along a straight line between any two sizes at
+    which a score begins or ceases to be clipped.
     """
-    low, high = (along - clip * sigma).min(axis=1), (along + clip * sigma).max(axis=1)
-    for _ in range(_HALVINGS):
-        middle = 0.5 * (low + high)
-        scores = np.clip((along - middle[:, None]) / sigma, -clip, clip)
-        enough = scores.sum(axis=1) >= wanted
-        low, high = np.where(enough, middle, low), np.where(enough, high, middle)
-    return low
+    ends = np.hstack([along - clip * sigma, along + clip * sigma])
+    order, slopes = np.argsort(ends, axis=1), np.hstack([-1.0 / sigma, 1.0 / sigma])
+    ends = np.take_along_axis(ends, order, axis=1)
+    slopes = np.cumsum(np.take_along_axis(slopes, order, axis=1), axis=1)[:, :-1]
+    fallen = np.cumsum(slopes * np.diff(ends, axis=1), axis=1) + clip * along.shape[1]
+    # The first piece that ends below; the last one where round-off hides it.
+    piece = np.minimum(np.sum(fallen >= wanted, axis=1), fallen.shape[1] - 1)
+    rows = np.arange(len(along))
+    return ends[rows, piece + 1] + (wanted - fallen[rows, piece]) / slopes[rows, piece]
 
 
 @lru_cache
