@@ -1,5 +1,6 @@
 """A command in a process of its own, held to memory and time, forked from one that imported it."""
 
+import gc
 import multiprocessing
 import os
 import resource
@@ -14,6 +15,7 @@ FORKED.set_forkserver_preload(
 
 def run(words, folder, log, seconds, most_bytes):
     """Run a command in ``folder`` and leave; ``log`` gets its standard error."""
+    gc.freeze()  # a collection would copy every page of what the process was forked with
     resource.setrlimit(resource.RLIMIT_AS, (most_bytes, most_bytes))
     resource.setrlimit(resource.RLIMIT_CPU, (seconds, seconds))
     os.chdir(folder)
