@@ -15,10 +15,11 @@ sys.path[:0] = [str(TESTS), *(str(TESTS / name) for name in ("checks", "cli", "c
 import plants  # noqa: E402
 from command_line import answer  # noqa: E402
 from good_files import File, simulated  # noqa: E402
-from stages_by_hand import made, tables_in  # noqa: E402
+from stages_by_hand import STAGES, tables_in  # noqa: E402
 
 from kinacc.campaign import folder as campaigns  # noqa: E402
 from kinacc.campaign.state import unplanned_mm2  # noqa: E402
+from kinacc.study import monte_carlo  # noqa: E402
 from kinacc.tables import store  # noqa: E402
 from kinacc.workflow.data_sets import DataSets, read_data_sets  # noqa: E402
 
@@ -27,7 +28,15 @@ ROOT = GOLDEN.parents[1]
 RESULTS = GOLDEN / "results"
 MARKS = {"kinacc_version": "golden", "config_hash": "golden", "seed": "0"}
 CALIBRATION = ("measurements", "vec", "dh", "residuals", "summary")
-PAPER = (*CALIBRATION, "accuracy_map", "assessment_points", "study", "histories", "claims")
+PAPER = (
+    *CALIBRATION,
+    "accuracy_map",
+    "assessment_points",
+    "study_chunk",
+    "study",
+    "histories",
+    "claims",
+)
 DATA_SETS = {
     "mh180": PAPER,
     "ur10_d": CALIBRATION,
@@ -52,9 +61,12 @@ def write_simulated_files() -> None:
         file.write(GOLDEN / "data", name).unlink()
 
 
-def run_stage(data: DataSets, dataset: str, stage: str, folder: Path) -> dict[str, Mapping]:
-    """Tables that one stage makes of the tables in a folder."""
-    return made(stage, tables_in(folder), data.settings[dataset])
+def run_stage(
+    data: DataSets, dataset: str, stage: str, folder: Path, **other: object
+) -> dict[str, Mapping]:
+    """Tables that one stage makes of the tables in a folder, with ``other`` settings."""
+    run = {**STAGES, "study_chunk": monte_carlo.simulated}[stage]
+    return run(tables_in(folder), {**data.settings[dataset], **other})
 
 
 def write_tables(tables: Mapping[str, Mapping], folder: Path) -> None:
