@@ -164,15 +164,17 @@ def bias(pose_errors: pd.DataFrame, q_rad: np.ndarray) -> Iterator[tuple[Any, ..
         DH joints of all measured rows, shape (n, k).
     """
     for names, group in pose_errors.groupby(["comparison", "estimate"], sort=False):
-        squared = np.square(group[_POSITION]).sum(axis=1)
-        for joint, angle in enumerate(q_rad[group["row"]].T, 1):
-            edges = np.linspace(angle.min(), angle.max(), REGIONS + 1)
-            region = np.clip(np.searchsorted(edges, angle, side="right") - 1, 0, REGIONS - 1)
-            parts = group.groupby(region)[_POSITION]
-            rms = np.sqrt(squared.groupby(region).mean())
-            table = pd.concat([parts.size(), parts.mean(), parts.sem(), rms], axis=1)
-            for number, *figures in table.itertuples(name=None):
-                yield (*names, joint, edges[number], edges[number + 1], *figures)
+        angle = q_rad[group["row"]]
+        edges = np.linspace(angle.min(axis=0), angle.max(axis=0), REGIONS + 1)
+        region = np.sum(angle[:, None] >= edges[1:-1], axis=1)
+        joint = np.broadcast_to(np.arange(angle.shape[1]), angle.shape)
+        errors = group[_POSITION].assign(square=np.square(group[_POSITION]).sum(axis=1))
+        errors = errors.loc[errors.index.repeat(angle.shape[1])]
+        parts = errors.groupby([joint.ravel(), region.ravel()])
+        mean, rms = parts[_POSITION].mean(), np.sqrt(parts["square"].mean())
+        table = pd.concat([parts.size(), mean, parts[_POSITION].sem(), rms], axis=1)
+        for (j, number), *figures in table.itertuples(name=None):
+            yield (*names, j + 1, edges[number, j], edges[number + 1, j], *figures)
 
 
 def worst(pose_errors: pd.DataFrame, line: np.ndarray) -> pd.DataFrame:
