@@ -104,8 +104,7 @@ COMMANDS = {
 def much(tmp_path_factory) -> Path:
     """A folder with files of too many rows."""
     folder = tmp_path_factory.mktemp("much")
-    zeros = pa.array(np.zeros(3_000_000, np.int8))
-    repeated(folder / "much.parquet", dict.fromkeys(COLUMNS, zeros), 20)
+    repeated(folder / "much.parquet", dict.fromkeys(COLUMNS, pa.nulls(3_000_000, pa.int8())), 20)
     row = ",".join(["1"] * 9) + "\n"
     (folder / "much.csv").write_text(",".join(COLUMNS) + "\n" + row * 1_050_000)
     return folder
@@ -232,7 +231,7 @@ RESULTS = {
     "long texts": lambda path: repeated(path, {"name": texts(10_000)}, 1),
     "a pipe": os.mkfifo,
     "many values": lambda path: repeated(
-        path, dict.fromkeys(COLUMNS, pa.array(np.zeros(3_000_000, np.int8))), 4
+        path, dict.fromkeys(COLUMNS, pa.nulls(3_000_000, pa.int8())), 4
     ),
 }
 

@@ -1,9 +1,11 @@
 """Results whose files or settings changed after them are named as outdated, in one line."""
 
 import json
+import sys
 
 import pytest
 from command_line import call
+from preloaded import python
 from stages_by_hand import run_stages
 from tracked_arm import init_seen, quickened, tracked
 
@@ -25,6 +27,7 @@ def calibrated(tmp_path_factory):
     quickened(folder / "seen.yaml")
     with pytest.MonkeyPatch.context() as patch:
         patch.chdir(folder)
+        patch.setattr(sys, "executable", python())
         assert run_workflow("results/seen/measurements.parquet", ["seen.yaml"], 1) == 0
         run_stages(("vec", "dh", "residuals", "summary"), ["seen.yaml"])
     return folder

@@ -9,7 +9,7 @@ import sys
 PROGRAM = """
 import sys
 from kinacc.cli import main
-sys.argv[1:] = ["show", "nowhere"]
+sys.argv[1:] = ["no command"]  # whose modules would be imported after this
 try:
     main()
 finally:
