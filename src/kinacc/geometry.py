@@ -227,7 +227,7 @@ def inverse_transposed(matrix: np.ndarray) -> np.ndarray:
         Matrices, shape (3, 3, n).
     """
     x, y, z = matrix
-    cofactors = np.stack([cross(y, z), cross(z, x), cross(x, y)])
+    cofactors = np.array([cross(y, z), cross(z, x), cross(x, y)])
     return cofactors / np.sum(x * cofactors[0], axis=0)
 
 
@@ -245,7 +245,7 @@ def cross(one: np.ndarray, other: np.ndarray) -> np.ndarray:
         Vectors, shape (3, n).
     """
     (a, b, c), (u, v, w) = one, other
-    return np.stack([b * w - c * v, c * u - a * w, a * v - b * u])
+    return np.array([b * w - c * v, c * u - a * w, a * v - b * u])
 
 
 def rotation_from_quaternion(quaternion: np.ndarray) -> np.ndarray:

@@ -7,6 +7,8 @@ where asked for.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 from oracles.controllers.arms import ARMS
 from oracles.kinematics import dh_forward, rot_x, rot_y, rot_z, trans
@@ -26,7 +28,7 @@ GEARS_RAD, BACK_RAD, NOISE_MM = 1e-4, 1e-5, 0.03
 
 def month(
     number: int,
-    knock_rad: np.ndarray | float = 0.0,
+    knock_rad: Sequence[float] | float = 0.0,
     other_poses: bool = False,
     moved: bool = False,
 ) -> Observations:

@@ -37,6 +37,7 @@ def bent(model: dh.DHModel, seed: int) -> dh.DHModel:
     return disturbed(model, np.arange(5) < 4, np.random.default_rng(seed), 1e-3, 0.3)
 
 
+@cache
 def truth(name: str) -> dh.DHModel:
     """A real arm: the nominal one with errors of a tenth of a millimetre and of a milliradian."""
     return bent(robot.load(name).dh, 1)

@@ -36,11 +36,8 @@ def sure_of_all(arm):
 
 @pytest.mark.parametrize("name", ["mh180", "ur10"])
 def test_repeated_calibrations_of_one_arm_differ_by_chance_alone(name):
-    q_rad = joints(name, 60)
-    found = [
-        compare(calibrated(name, "dh", 60, 200 + i), calibrated(name, "dh", 60, 300 + i), q_rad)
-        for i in range(14)
-    ]
+    q_rad, arms = joints(name, 60), [calibrated(name, "dh", 60, 200 + i) for i in range(14)]
+    found = [compare(arms[i - 1], arm, q_rad) for i, arm in enumerate(arms)]
     assert {each.verdict for each in found} == {comparison.UNPROVEN}
     chances = np.array([each.probability for each in found])
     assert chances.min() > 1e-3
@@ -55,7 +52,7 @@ def test_predictions_are_as_far_off_as_they_say():
     q_rad = joints("mh180", 12, seed=21)
     wanted = compose(BASE, compose(dh.forward(truth("mh180"), q_rad), TOOL)).position_mm
     scores = []
-    for seed in (*range(200, 214), *range(300, 314)):  # those that are compared above
+    for seed in range(200, 214):  # those that are compared above
         found = predict(calibrated("mh180", "dh", 60, seed), q_rad, None, "instrument")
         scores.append((found.pose.position_mm - wanted) / found.std[:, :3])
     assert np.mean(np.square(scores)) == pytest.approx(1.0, abs=0.25)
@@ -63,8 +60,8 @@ def test_predictions_are_as_far_off_as_they_say():
 
 @pytest.mark.parametrize(("first", "second", "common"), [(60, 60, 30), (50, 90, 50)])
 def test_readings_in_both_calibrations_are_counted_once(first, second, common):
-    q_rad, found, apart = joints("mh180", 60), [], []
-    for seed in range(500, 509):
+    q_rad, found = joints("mh180", 60), []
+    for seed in range(500, 507):
         seen = measured("mh180", first + second - common, seed=seed)
         one, other = (
             calibration(results_of("mh180", seen.select(rows)), "dh", "mh180")
@@ -72,11 +69,10 @@ def test_readings_in_both_calibrations_are_counted_once(first, second, common):
         )
         known = SharedReadings(common, first, second)
         found.append(compare(one, other, q_rad, known))
-        apart.append(compare(one, other, q_rad))
     statistic, shifts = ratios(found)
     assert statistic == pytest.approx(1.0, abs=0.25)
-    assert ratios(apart)[0] < 0.7
     assert shifts[1] == pytest.approx(1.0, abs=0.6)
+    assert compare(one, other, q_rad).statistic < 0.7 * found[-1].statistic
 
 
 @pytest.mark.parametrize(

@@ -97,11 +97,10 @@ def test_values_typed_into_a_controller_err_by_no_more_than_the_page_states(tmp_
         typed.setdefault(each["group"], {})[each["name"]] = round(each["new"], digits)
     first, *_, last = typed.get("joint zeros", {"A1": 0.0, "A6": 0.0}).values()
     assert first == last == 0.0  # no pose tells them from base and tool
-    misses = []
-    for near in arm.draw(np.random.default_rng(6), POSES):
-        goal = measured.BASE @ arm.pose(near) @ measured.TOOL
-        shown = joints_for(maker, arm, typed, tmp_path / f"arm_{maker}", goal, near)
-        misses.append(apart(goal, measured.seen(arm, shown)))
+    near = arm.draw(np.random.default_rng(6), POSES)
+    goals = measured.BASE @ arm.pose(near) @ measured.TOOL
+    shown = joints_for(maker, arm, typed, tmp_path / f"arm_{maker}", goals, near)
+    misses = [*map(apart, goals, measured.seen(arm, shown))]
     mean, (stated, best, _) = np.mean(misses, axis=0), told["errors"]
     assert mean[0] <= FACTOR * stated["position_mm"]
     assert mean[1] <= FACTOR * stated["orientation_mrad"] < 9.0

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import cache
 
 import numpy as np
 import pandas as pd
@@ -18,37 +19,52 @@ from small_arms import results_of
 from kinacc.calibration.observations import full_poses
 from kinacc.deployment import history as histories
 from kinacc.deployment.history import LEVEL, session_of
-from kinacc.deployment.history_model import Moved, misfit_factor
+from kinacc.deployment.history_model import DRAWS, Moved, misfit_factor
 from kinacc.geometry import Pose
 from kinacc.kinematics import robot as robots
 from kinacc.tables.allowed import MOVED, SAME
 
-FAR_RAD = 0.02 * np.array([1.0, -1.0, 1.0, -1.0, 1.0, -1.0])
-KNOCK_RAD = np.array([0.0, 0.0, 2e-3, 0.0, 0.0, 0.0])
+FAR_RAD = (0.02, -0.02, 0.02, -0.02, 0.02, -0.02)
+KNOCK_RAD = (0.0, 0.0, 2e-3, 0.0, 0.0, 0.0)
+
+
+@pytest.fixture(autouse=True)
+def few_draws(monkeypatch):
+    """A tenth of them, which changes what chance shows by a percent or two."""
+    monkeypatch.setattr(histories.history_model, "DRAWS", 10_000)
 
 
 def history(*sessions):
     return histories.history(sessions, 500.0)
 
 
+@cache
+def months(*knocks_rad, other_poses=False, moved=False):
+    """Lines of months with knocks of all joints, and their history.
+
+    A third one is said to stand where the second does: of the first, it was moved all the same.
+    """
+    lines = []
+    for number, knock_rad in enumerate(knocks_rad, 1):
+        base = MOVED if moved and number < 3 else SAME
+        lines.append(session(month(number, knock_rad, other_poses, moved), number, base))
+    return lines, history(*lines)
+
+
 @pytest.mark.parametrize(("other_poses", "moved"), [(False, False), (True, False), (True, True)])
 def test_months_in_which_nothing_happens_raise_no_alarm(other_poses, moved):
-    months = [(n, month(n, 0.0, other_poses, moved)) for n in (1, 2, 3)]
-    # The third is said to stand where the second does: of the first, it was moved all the same.
-    lines = [session(seen, n, MOVED if moved and n < 3 else SAME) for n, seen in months]
-    found = history(*lines)
+    lines, found = months(0.0, 0.0, 0.0, other_poses=other_poses, moved=moved)
     assert list(found["verdict"]) == ["first", "holds", "holds"]
     assert (found["in_force_mean_mm"][1:] < 1.0).all()
     if not moved:
-        later = months[1][1]
+        later = lines[1].observations
         at = lines[0].calibration.pose(later.at, "instrument")
         sizes = np.linalg.norm(later.position_mm - at.position_mm, axis=1)
         assert found["in_force_mean_mm"][1] == pytest.approx(sizes.mean())
 
 
 def test_a_knocked_joint_is_named_and_the_new_calibration_is_in_force_from_then_on():
-    knocked = [0.0, KNOCK_RAD, KNOCK_RAD]
-    found = history(*(session(month(n, k), n) for n, k in enumerate(knocked, 1)))
+    _, found = months(0.0, KNOCK_RAD, KNOCK_RAD)
     assert list(found["verdict"]) == ["first", "recalibrate", "holds"]
     assert found["in_force"][2] == "ur-2026-02-01"
     assert found["joint"][1] == 3
@@ -76,6 +92,7 @@ def test_a_tracker_that_was_moved_is_seen_but_not_beside_as_large_a_drift():
 
 
 def test_chance_along_all_directions_alike_is_that_of_chi_square(monkeypatch):
+    monkeypatch.setattr(histories.history_model, "DRAWS", DRAWS)
     moved = Moved(np.eye(4), np.array([0.1, -0.2, 0.25, 0.1]), 0.01 * np.eye(4))
     probability, chance_mm = moved.test(0.005)
     assert probability == pytest.approx(scipy.stats.chi2.sf(12.25, 4), rel=0.05)
@@ -87,8 +104,7 @@ def test_chance_along_all_directions_alike_is_that_of_chi_square(monkeypatch):
 
 
 def test_misfit_that_differs_between_halves_widens_the_limit_at_other_poses(monkeypatch):
-    lines = [session(month(n, other_poses=True), n) for n in (1, 2)]
-    usual = history(*lines)
+    (*lines, _), usual = months(0.0, 0.0, 0.0, other_poses=True, moved=False)
     monkeypatch.setattr(histories.history_model, "misfit_factor", lambda halves: 3.0)
     wide = history(*lines)
     assert wide["chance_mm"][1] == pytest.approx(3.0 * usual["chance_mm"][1], rel=0.15)
@@ -96,8 +112,8 @@ def test_misfit_that_differs_between_halves_widens_the_limit_at_other_poses(monk
 
 
 def test_the_history_is_the_same_in_whatever_order_lines_were_added():
-    one, two, three = (session(month(n, other_poses=n == 3), n) for n in (1, 2, 3))
-    whole, backward = history(one, two, three), history(two, one)
+    (one, two, _), whole = months(0.0, 0.0, 0.0, other_poses=False, moved=False)
+    backward = history(two, one)
     for name, column in whole.items():
         np.testing.assert_array_equal(column[:2], backward[name])
 
@@ -116,10 +132,9 @@ def test_what_was_moved_counts_since_the_line_in_force_and_not_before_it():
 
 
 def test_readings_of_the_line_in_force_are_not_compared_with_themselves():
-    old, new = month(1), month(2, KNOCK_RAD)
-    both = histories.joined(new, old, set())
-    first, second = session(old, 1), session(new, 2)
-    alone, grown = (history(first, replace(second, observations=each)) for each in (new, both))
+    (first, second, _), alone = months(0.0, KNOCK_RAD, KNOCK_RAD)
+    both = histories.joined(second.observations, first.observations, set())
+    grown = history(first, replace(second, observations=both))
     assert grown["verdict"][1] == "recalibrate"
     for name in ("moved_mm", "chance_mm", "in_force_mean_mm"):
         assert grown[name][1] == pytest.approx(alone[name][1], rel=1e-3)
@@ -139,12 +154,11 @@ def tables_as_the_workflow_gives_them(seen):
 
 def test_series_are_compared_about_the_fitted_dh_model_where_a_vec_model_is_selected():
     """A VEC model holds the nominal one: about that, noise alone moves this arm by 16 % more."""
-    months = [(number, month(number, FAR_RAD, moved=True)) for number in (1, 2)]
-    lines = [
-        session_of(tables_as_the_workflow_gives_them(seen), f"ur-{n}", f"{n}", MOVED, SAME)
-        for n, seen in months
-    ]
-    found, about_dh = history(*lines), history(*(session(seen, n, MOVED) for n, seen in months))
+    far, about_dh = months(FAR_RAD, FAR_RAD, moved=True)
+    tables = [tables_as_the_workflow_gives_them(line.observations) for line in far]
+    found = history(
+        *(session_of(each, f"ur-{n}", f"{n}", MOVED, SAME) for n, each in enumerate(tables, 1))
+    )
     assert found["model"][1] == "vec"
     assert found["probability"][1] > LEVEL
     for name in ("moved_mm", "chance_mm", "probability"):
@@ -153,11 +167,11 @@ def test_series_are_compared_about_the_fitted_dh_model_where_a_vec_model_is_sele
 
 def test_an_arm_far_from_its_dh_model_raises_no_alarm():
     """What base, tool and joints share is bound to the model, but so softly that nothing moves."""
-    lines = [session(month(n, FAR_RAD, moved=True), n, MOVED) for n in (1, 2)]
+    lines, about_fitted = months(FAR_RAD, FAR_RAD, moved=True)
     far = history(*(replace(line, dh=robots.load("ur10").dh) for line in lines))
     assert far["verdict"][1] == "holds"
     assert far["probability"][1] > 0.05
-    assert far["moved_mm"][1] == pytest.approx(history(*lines)["moved_mm"][1], rel=0.2)
+    assert far["moved_mm"][1] == pytest.approx(about_fitted["moved_mm"][1], rel=0.2)
 
 
 def ur10_series(name, number):

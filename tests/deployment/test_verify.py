@@ -3,16 +3,19 @@
 from __future__ import annotations
 
 import json
+import shutil
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pandas as pd
 import pytest
-from command_line import call, small_study
+from command_line import call
 from held_out_errors import held_out_mm
 from read_columns import XYZ_MM
 
 from kinacc.calibration.observations import from_columns, full_poses
+from kinacc.deployment import permutation
 from kinacc.deployment.folder import calibration, read_tables, robot_of
 from kinacc.deployment.permutation import ErrorColumns, compare, smallest_changes
 from kinacc.deployment.predict import predict
@@ -37,7 +40,13 @@ def heavy_tailed(rng, count, is_fitted):
     return ErrorColumns(np.concatenate([shifts, joints, sizes], axis=2), 3)
 
 
-def test_the_level_does_not_rest_on_how_errors_are_spread():
+@pytest.fixture
+def few_draws(monkeypatch):
+    """A quarter of the random samples: a level or a power is the same, and many tests are quick."""
+    monkeypatch.setattr(permutation, "_DRAWS", 1000)
+
+
+def test_the_level_does_not_rest_on_how_errors_are_spread(few_draws):
     rng = np.random.default_rng(4)
     chances = []
     for _ in range(200):
@@ -59,7 +68,7 @@ def test_a_fit_to_the_new_errors_is_undone_by_its_degrees_of_freedom():
     assert found.expected_mm == pytest.approx(found.rms_mm / np.sqrt(1.0 - 3 / 12))
 
 
-def test_changes_of_the_stated_sizes_are_found_in_four_of_five_cases():
+def test_changes_of_the_stated_sizes_are_found_in_four_of_five_cases(few_draws):
     found = np.zeros((3, 40, 2))
     for seed in range(3):
         rng = np.random.default_rng(seed)
@@ -100,11 +109,11 @@ def test_columns_are_those_of_what_was_moved_and_of_the_joints_as_reported():
 
 
 @pytest.fixture(scope="module")
-def folder(tmp_path_factory):
+def folder(study, tmp_path_factory):
     """Results of a small arm, and its readings from elsewhere, without and with a target."""
     base = tmp_path_factory.mktemp("verify")
-    found = small_study(base)
-    table = pd.read_parquet(found / "measurements.parquet")
+    found = Path(shutil.copytree(study, base / "results" / "mh180"))
+    table = pd.read_parquet(found / "measurements.parquet")[::3]
     elsewhere = np.hstack([table[JOINTS], table[XYZ_MM] @ ELSEWHERE.rotation.T + 2000.0])
     written(base, "moved", elsewhere)
     written(base, "other_target", elsewhere, target="ball_")

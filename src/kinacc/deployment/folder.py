@@ -121,7 +121,8 @@ def _calibration(tables: Tables, model: str | None, name: str, session: str | No
         raise input_error("model", message, ", ".join(created))
     bounded = next(item for item in created.values() if item.domain is not None)
     frames, identified = tables["frames"], tables.get(f"{PLAINEST}_identified")
-    of_model = pd.DataFrame(dict(frames)).query("model == @choice").set_index("frame")
+    of_model = pd.DataFrame(dict(frames)).set_index("frame")
+    of_model = of_model[of_model["model"] == choice]
     number = _session_number(of_model, session)
     bases = [model_tables.frame(frames, kind, "base", session) for kind in (PLAINEST, choice)]
     # A model with the base of the DH model: neither was fitted with it.
@@ -199,8 +200,8 @@ def uncertainty(tables: Tables, choice: str) -> Uncertainty | None:
     table = pd.DataFrame(dict(tables[f"{choice}_covariance"]))
     parameters = table["parameter"].unique()
     half = table.pivot(index="parameter", columns="other", values="covariance")
-    half = half.reindex(index=parameters, columns=parameters)
-    covariance = half.fillna(half.T).fillna(0.0).to_numpy()
+    half = half.reindex(index=parameters, columns=parameters).to_numpy()
+    covariance = np.nan_to_num(np.where(np.isnan(half), half.T, half))
     names = ["quantity", "number", "parameter", "value"]
     fit = pd.DataFrame(dict(tables.get(f"{choice}_fit", {})), columns=names)
     fit = fit[fit["quantity"] == "undetermined_direction"]

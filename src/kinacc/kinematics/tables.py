@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import numpy as np
-import pandas as pd
 
 from kinacc.config.error_models import ERROR_MODELS, NOMINAL, loaded
 from kinacc.errors import input_error
@@ -13,6 +12,7 @@ from kinacc.kinematics.model import ErrorModel
 from kinacc.tables.columns import Columns, Tables
 
 _ROUNDING = 1e-9
+_FRAME = ("qw", "qx", "qy", "qz"), ("x_mm", "y_mm", "z_mm")
 
 
 def models(tables: Tables, nominal: DHModel) -> dict[str, ErrorModel]:
@@ -77,16 +77,16 @@ def frame(columns: Columns, model: str, name: str, session: str | None = None) -
     InputError
         For a frame that the table lacks; the message lists those it has.
     """
-    table = pd.DataFrame(dict(columns))
-    table = table[table["model"] == model]
-    rows = table[table["frame"] == name]
+    frames, of_model = np.asarray(columns["frame"]), np.asarray(columns["model"]) == model
+    rows = of_model & (frames == name)
     if session is not None:
-        rows = rows[rows["session"] == session]
-    if rows.empty:
-        known = ", ".join(table["frame"]) or "none"
+        rows &= np.asarray(columns["session"]) == session
+    if not rows.any():
+        known = ", ".join(frames[of_model]) or "none"
         raise input_error("table frames", f"has no frame {name!r} of model {model}", known)
-    values = rows[["qw", "qx", "qy", "qz", "x_mm", "y_mm", "z_mm"]].to_numpy(dtype=float)[0]
-    return Pose(rotation_from_quaternion(values[:4]), values[4:])
+    first = np.argmax(rows)
+    quaternion, place = ([float(columns[each][first]) for each in names] for names in _FRAME)
+    return Pose(rotation_from_quaternion(np.array(quaternion)), np.array(place))
 
 
 def fitted_tool(columns: Columns | None, model: str, own: Pose) -> Pose | None:

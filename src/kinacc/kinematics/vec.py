@@ -166,8 +166,8 @@ class VECModel(ErrorModel):
         dh = DHModel(**{name: arm[name] for name in PARAMETERS}, prismatic=nominal.prismatic)
         ends = arm["q_min_rad"], arm["q_max_rad"]
         empty = cls(dh, *ends, np.zeros(shape), np.zeros((len(arm), 2)))
-        last = table["direction"].map(_DIRECTIONS).fillna(table["order"].astype(str))
-        names = "j" + table["joint"].astype(str) + "." + table["error"] + "." + last
+        rows = table[["joint", "error", "direction", "order"]].itertuples(index=False)
+        names = [f"j{joint}.{error}.{_DIRECTIONS.get(d, n)}" for joint, error, d, n in rows]
         values = table["coefficient"].set_axis(names).reindex(empty.names, fill_value=0.0)
         return empty.with_parameters(values.to_numpy())
 

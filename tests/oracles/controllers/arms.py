@@ -7,7 +7,6 @@ from pathlib import Path
 
 import numpy as np
 import yaml
-from scipy.optimize import root
 from scipy.spatial.transform import Rotation
 
 from oracles.kinematics import dh_frames, frame
@@ -43,8 +42,8 @@ class Arm:
         return np.pad(np.array(self.rows) * [DEG, 1.0, 1.0, DEG], ((0, 0), (0, 1)))
 
     def frames(self, shown: np.ndarray, true: bool = False) -> list[np.ndarray]:
-        """The base frame and the frame after each joint, at joints shown on the pendant (6,)."""
-        q = self.matrix @ shown
+        """The base frame and the frame after each joint, at joints shown on the pendant (..., 6)."""
+        q = shown @ self.matrix.T
         return dh_frames(self.table + true * self.errors, q + true * self.wave * np.sin(2.0 * q))
 
     def pose(self, shown: np.ndarray, true: bool = False) -> np.ndarray:
@@ -57,16 +56,23 @@ class Arm:
         return frame(*self.flange[:3], Rotation.from_rotvec(self.flange[3:], degrees=True))
 
     def joints(self, wanted: np.ndarray, near: np.ndarray) -> np.ndarray:
-        """Joints shown at which the arm as described puts its flange at a pose, near others."""
+        """Joints shown (n, 6) at which the arm as described puts its flange at poses, near others.
+
+        Newton's method on differences (m and rad).
+        """
 
         def off(q):
             apart = np.linalg.inv(wanted) @ self.pose(q)
-            turn = Rotation.from_matrix(apart[:3, :3]).as_rotvec()
-            return np.concatenate([apart[:3, 3] / 1000.0, turn])
+            turn = Rotation.from_matrix(apart[:, :3, :3]).as_rotvec()
+            return np.hstack([apart[:, :3, 3] / 1000.0, turn])
 
-        found = root(off, near, tol=1e-14)
-        assert np.abs(found.fun).max() < 1e-9, f"{self.name}: out of reach"
-        return found.x
+        q = np.array(near)
+        for _ in range(8):
+            gap = off(q)
+            slopes = np.stack([off(q + step) - gap for step in 1e-6 * np.eye(6)], axis=2)
+            q -= 1e-6 * np.linalg.solve(slopes, gap[..., None])[..., 0]
+        assert np.abs(off(q)).max() < 1e-9, f"{self.name}: out of reach"
+        return q
 
     def draw(self, rng: np.random.Generator, count: int, part: float = 1.0) -> np.ndarray:
         """Joints shown (count, 6), evenly in ``part`` of the ranges."""

@@ -9,18 +9,19 @@ from oracles.controllers.programs import Program
 from oracles.kinematics import apart
 
 
-def shown(program: Program, numbers: list[float]) -> list[np.ndarray]:
+def shown(program: Program, numbers: list[float]) -> np.ndarray:
     """Joints on the pendant at every point: the arm as described reaches the written pose."""
-    found = []
-    for point in program.points:
+    found = np.array([point.shown for point in program.points])
+    poses, near = {}, found.copy()
+    for row, point in enumerate(program.points):
         own = [numbers[place] for place in point.places]
         if point.of_joints:
-            found.append(program.convention.joints(own))
-            continue
-        flange = program.base @ program.convention.pose(own) @ np.linalg.inv(program.tool)
-        joints = program.arm.joints(flange, point.shown)
-        assert np.abs(joints - point.shown).max() < 0.1, "the arm would stand in another posture"
-        found.append(joints)
+            found[row] = program.convention.joints(own)
+        else:
+            poses[row] = program.convention.pose(own)
+    flanges = program.base @ np.array([*poses.values()]) @ np.linalg.inv(program.tool)
+    found[[*poses]] = program.arm.joints(flanges, near[[*poses]])
+    assert np.abs(found - near)[[*poses]].max() < 0.1, "the arm would stand in another posture"
     return found
 
 
@@ -31,8 +32,6 @@ def misses(program: Program, numbers: list[float], base: np.ndarray) -> np.ndarr
     it is known.
     """
     meant = shown(program, [float(each) for each in program.numbers])
-    rows = []
-    for wanted, real in zip(meant, shown(program, numbers), strict=True):
-        goal = base @ program.arm.pose(wanted) @ program.tool
-        rows.append(apart(goal, measured.seen(program.arm, real)))
-    return np.array(rows)
+    goals = base @ program.arm.pose(meant) @ program.tool
+    there = measured.seen(program.arm, shown(program, numbers))
+    return np.array([*map(apart, goals, there)])

@@ -18,7 +18,7 @@ NOISE_MM, NOISE_RAD = 0.03, 6e-5
 
 
 def seen(arm: Arm, shown: np.ndarray) -> np.ndarray:
-    """Where the target of the true arm is, in the tracker's frame, at joints shown (6,)."""
+    """Where the target of the true arm is, in the tracker's frame, at joints shown (..., 6)."""
     return BASE @ arm.pose(shown, true=True) @ TOOL
 
 
@@ -26,8 +26,7 @@ def write(folder: Path, arm: Arm, poses: int = 90, order: int = 1) -> Path:
     """A robot file, a file of measured poses and a configuration; the configuration's path."""
     rng = np.random.default_rng(11)
     shown = arm.draw(rng, poses)
-    there = np.array([seen(arm, each) for each in shown])
-    write_noisy(folder / "poses.csv", shown, there, rng, NOISE_MM, NOISE_RAD)
+    write_noisy(folder / "poses.csv", shown, seen(arm, shown), rng, NOISE_MM, NOISE_RAD)
     (folder / "robot.yaml").write_text(arm.description())
     config = folder / "arm.yaml"
     config.write_text(

@@ -32,7 +32,7 @@ class _Shifted(Arm):
     def pose(self, shown: np.ndarray, true: bool = False) -> np.ndarray:
         here = np.eye(4)
         table = np.insert(self.table, 3, 0.0, axis=1) + self.errors
-        for (theta, d, a, b, alpha, beta), q in zip(table, shown, strict=True):
+        for (theta, d, a, b, alpha, beta), q in zip(table, np.transpose(shown), strict=True):
             here = here @ rot_z(q + theta) @ trans(a, b, d) @ rot_x(alpha) @ rot_y(beta)
         return here
 
@@ -40,7 +40,7 @@ class _Shifted(Arm):
 def joints_for(
     maker: str, arm: Arm, typed: dict[str, dict[str, float]], file: Path, goal: np.ndarray, near
 ) -> np.ndarray:
-    """Joints (6,) of the arm as first mastered when its controller is sent to ``goal`` in BASE."""
+    """Joints (n, 6) of the arm as first mastered when its controller is sent to goals in BASE."""
     to_frame = CONVENTIONS[maker].pose
     tool, base = (to_frame([*typed[group].values()]) for group in ("TOOL tool", "BASE"))
     flange = base @ goal @ np.linalg.inv(tool)
