@@ -33,7 +33,7 @@ def newton(table, target: np.ndarray, starts: np.ndarray) -> np.ndarray:
     q, damping = starts.astype(float), np.full((len(starts), 1, 1), 1e-3)
     here, slope = dh_step(table, q)
     error = pose_error(target, here)
-    for _ in range(60):
+    for _ in range(30):
         across = np.swapaxes(slope, 1, 2)
         normal = across @ slope
         held = damping * np.eye(q.shape[1]) * (normal + 1e-9)

@@ -16,7 +16,7 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 import pytest
-from oracles.kinematics import frame
+from oracles.kinematics import frame, turn
 from pose_checks import assert_same, of_matrices
 from scipy.optimize import minimize
 from scipy.spatial.transform import Rotation
@@ -26,8 +26,6 @@ from kinacc.kinematics import dh, robot
 from kinacc.measurements.intake.write import template_text
 
 URDF = dict(list(pd.read_csv(Path(__file__).with_name("urdf_joints.csv")).groupby("robot")))
-AXES = {sign + name: s * axis for name, axis in zip("xyz", np.eye(3), strict=True)
-        for sign, s in (("", 1.0), ("-", -1.0))}  # fmt: skip
 # Joint 3 of the URDF turns by J3 + this times J2 of the controller.
 COUPLED = {name: 1.0 for name in URDF if name.startswith("fanuc")} | {"irb2400_12_155": -1.0}
 COUPLED["fanuc_r2000ic_165f"] = 0.0  # its measured data counts joint 3 from the upper arm
@@ -38,27 +36,27 @@ REACH = pd.read_csv(Path(__file__).with_name("reach.csv"), index_col="robot")
 
 
 def by_urdf(name: str, q_rad: np.ndarray) -> np.ndarray:
-    """Flange (4, 4) in the controller's base at controller joints ``q_rad``."""
+    """Flanges (n, 4, 4) in the controller's base at controller joints ``q_rad`` (n, k)."""
     turned = q_rad.copy()
-    turned[2] += COUPLED.get(name, 0.0) * q_rad[1]
+    turned[:, 2] += COUPLED.get(name, 0.0) * q_rad[:, 1]
     place = np.eye(4)
     for row in URDF[name].itertuples():
         angles = [row.roll_deg, row.pitch_deg, row.yaw_deg]
-        turn = Rotation.from_euler("xyz", angles, degrees=True)
-        in_parent = frame(row.x_mm, row.y_mm, row.z_mm, turn)
+        fixed = Rotation.from_euler("xyz", angles, degrees=True)
+        in_parent = frame(row.x_mm, row.y_mm, row.z_mm, fixed)
         if row.joint == "base":
             place = np.linalg.inv(in_parent)
             continue
         place = place @ in_parent
         if row.joint != "tool0":
-            angle = turned[int(row.joint) - 1]
-            place = place @ frame(turned=Rotation.from_rotvec(angle * AXES[row.axis]))
+            sign, axis = -1.0 if row.axis.startswith("-") else 1.0, "xyz".index(row.axis[-1])
+            place = place @ turn(axis, sign * turned[:, int(row.joint) - 1])
     return place
 
 
 def assert_published(name: str, arm: robot.Robot, q_rad: np.ndarray) -> None:
-    """The arm stands at joints as its URDF has it."""
-    assert_same(robot.forward(arm, q_rad), of_matrices([by_urdf(name, q_rad)]), 1e-6, 1e-9)
+    """The arm stands at joints (n, k) as its URDF has it."""
+    assert_same(robot.forward(arm, q_rad), of_matrices(by_urdf(name, q_rad)), 1e-6, 1e-9)
 
 
 def test_every_shipped_robot_is_held_here_and_names_its_source():
@@ -79,8 +77,7 @@ def test_every_shipped_robot_is_held_here_and_names_its_source():
 def test_zero_pose_and_others_are_those_of_the_published_model(name):
     arm = robot.load(name)
     poses = np.random.default_rng(1).uniform(arm.q_min_rad, arm.q_max_rad, (20, arm.dh.joints))
-    for q_rad in (np.zeros(arm.dh.joints), *poses):
-        assert_published(name, arm, q_rad)
+    assert_published(name, arm, np.vstack([np.zeros(arm.dh.joints), poses]))
 
 
 @pytest.mark.parametrize("name", REACH.index)
@@ -106,4 +103,4 @@ def test_the_form_is_the_arm_whose_lengths_are_filled_in():
         key = re.search(f"([da]): {letter}", lines[at])[1]
         lines[at] = lines[at].replace(f"{key}_mm: 100", f"{key}_mm: {length}")
     arm = robot.of_text("\n".join(lines), "form.yaml")
-    assert_published(name, arm, np.linspace(-1.0, 1.0, 6))
+    assert_published(name, arm, np.linspace(-1.0, 1.0, 6)[None])

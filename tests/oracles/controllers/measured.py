@@ -31,7 +31,7 @@ def write(folder: Path, arm: Arm, poses: int = 90, order: int = 1) -> Path:
     config = folder / "arm.yaml"
     config.write_text(
         "datasets: {arm: {robot: robot.yaml}}\n"
-        "measurements: {source: file, folds: 5, file: {path: poses.csv,"
+        "measurements: {source: file, folds: 3, file: {path: poses.csv,"
         " orientation: {kind: quaternion}}}\n"
         f"calibration: {{base_and_tool: estimated, vec: {{order: {order}}},"
         " dh: {fit_to: measurements, hayati_joints: auto}}\n"

@@ -191,9 +191,8 @@ def solve(
     if form is not None:
         q_rad = _by_closed_form(onto, form, pose, columns)
     else:
-        starts: list[float | None] = [None] if robot.dh.joints < 7 else list(grid_of(robot))
-        parts = [_searched(onto, pose, value) for value in starts]
-        q_rad = np.concatenate(parts, axis=1)[:, columns]
+        heads = np.zeros((1, 0)) if robot.dh.joints < 7 else grid_of(robot)[:, None]
+        q_rad = _searched(onto, pose, heads)[:, columns]
     good = np.isfinite(q_rad[..., 0])
     status = np.where(good, Status.FOUND, Status.NOT_REACHED).astype(np.int8)
     if fitted_range_rad is not None:
@@ -239,17 +238,21 @@ def _by_closed_form(
     return q_rad
 
 
-def _searched(onto: _Onto, pose: Pose, first: float | None) -> np.ndarray:
-    """Joints (n, b, k) in their branches, NaN where empty; joint 1 at ``first`` where given."""
-    dh, fixed = onto.robot.dh, int(first is not None)
+def _searched(onto: _Onto, pose: Pose, heads: np.ndarray) -> np.ndarray:
+    """Joints (n, g b, k) in their branches, NaN where empty.
+
+    ``heads`` (g, f): values at which the first f joints, none or one, are held in turn.
+    """
+    dh, (values, fixed) = onto.robot.dh, heads.shape
+    count = len(pose.position_mm)
+    heads, pose = np.repeat(heads, count, axis=0), pose.select(np.tile(np.arange(count), values))
     # Coupled joints, which have no limits of their own, make a turn.
     low, high = np.nan_to_num(limits.dh_limits(onto.robot), neginf=-np.pi, posinf=np.pi)
-    before = _dh.forward(dh.part(slice(fixed)), np.full((1, fixed), first, dtype=float))
+    before = _dh.forward(dh.part(slice(fixed)), heads)
     tail = slice(fixed, None)
     table = postures.table_of(dh.part(tail), low[tail], high[tail])
     rows, start = postures.search(table, compose(invert(before), pose), _NEAR_MISS_MM)
-    if first is not None:
-        start = np.insert(start, 0, first, axis=1)
+    start = np.hstack([heads[rows], start])
     q_rad, converged = onto.converge(pose.select(rows), start, fixed)
     rows, q_rad = rows[converged], q_rad[converged]
     number, start = _beside(dh, q_rad, fixed)
@@ -257,7 +260,9 @@ def _searched(onto: _Onto, pose: Pose, first: float | None) -> np.ndarray:
     rows = np.concatenate([rows, rows[number[converged]]])
     q_rad = np.concatenate([q_rad, again[converged]])
     new = ~postures.repeats(rows, q_rad, dh.prismatic)
-    return _placed(dh, len(pose.position_mm), rows[new], q_rad[new])
+    placed = _placed(dh, values * count, rows[new], q_rad[new])
+    placed = placed.reshape(values, count, *placed.shape[1:]).swapaxes(0, 1)
+    return placed.reshape(count, values * placed.shape[2], dh.joints)
 
 
 def _beside(dh: _dh.DHModel, q_rad: np.ndarray, first: int) -> tuple[np.ndarray, np.ndarray]:
