@@ -19,5 +19,6 @@ def calibrated(maker: str, wave: float = 0.0, poses: int = 90, order: int = 1) -
     """The results folder of a maker's arm that was measured and calibrated; its files beside it."""
     folder = Path(_FOLDER.name) / f"{maker}_{wave}_{poses}_{order}"
     folder.mkdir()
-    config = measured.write(folder, replace(MAKERS[maker], wave=wave), poses=poses, order=order)
+    arm = replace(MAKERS[maker], wave=wave)
+    config = measured.write(folder, arm, poses=poses, order=order, folds=3)
     return run_stages(CALIBRATED, [config], folder / "results")

@@ -174,10 +174,10 @@ def test_an_arm_far_from_its_dh_model_raises_no_alarm():
     assert far["moved_mm"][1] == pytest.approx(about_fitted["moved_mm"][1], rel=0.2)
 
 
-def ur10_series(name, number):
-    """A third of a series of one UR10, tracker and tool set up anew for each."""
+def ur10_series(name, number, every=3):
+    """Rows of a series of one UR10, tracker and tool set up anew for each."""
     path = shared_data.path_of(f"ur10_tmac/series_{name}.csv")
-    table = pd.read_csv(path)[::3]
+    table = pd.read_csv(path)[::every]
     q = np.deg2rad(table[Q_DEG].to_numpy())
     turns = table[["rx_deg", "ry_deg", "rz_deg"]].to_numpy()
     turned = Rotation.from_euler("XYZ", turns, degrees=True).as_matrix()
@@ -196,7 +196,7 @@ def test_series_of_one_ur10_measured_in_other_poses_raise_no_alarm():
 
 def test_what_cannot_be_told_has_a_reason():
     """Series in different parts of the joints, and too few poses."""
-    found = history(ur10_series("C", 1), ur10_series("B", 2))
+    found = history(ur10_series("C", 1, 12), ur10_series("B", 2, 12))
     assert found["verdict"][1] == "cannot be told"
     assert "joint ranges of ur-2026-01-01" in found["reason"][1]
     few = session(month(2).select(np.arange(12)), 2)

@@ -40,13 +40,13 @@ def heavy_tailed(rng, count, is_fitted):
     return ErrorColumns(np.concatenate([shifts, joints, sizes], axis=2), 3)
 
 
-@pytest.fixture
+@pytest.fixture(autouse=True)
 def few_draws(monkeypatch):
-    """A quarter of the random samples: a level or a power is the same, and many tests are quick."""
+    """A quarter of the random samples: levels and powers are the same, and tests quick."""
     monkeypatch.setattr(permutation, "_DRAWS", 1000)
 
 
-def test_the_level_does_not_rest_on_how_errors_are_spread(few_draws):
+def test_the_level_does_not_rest_on_how_errors_are_spread():
     rng = np.random.default_rng(4)
     chances = []
     for _ in range(200):
@@ -68,7 +68,7 @@ def test_a_fit_to_the_new_errors_is_undone_by_its_degrees_of_freedom():
     assert found.expected_mm == pytest.approx(found.rms_mm / np.sqrt(1.0 - 3 / 12))
 
 
-def test_changes_of_the_stated_sizes_are_found_in_four_of_five_cases(few_draws):
+def test_changes_of_the_stated_sizes_are_found_in_four_of_five_cases():
     found = np.zeros((3, 40, 2))
     for seed in range(3):
         rng = np.random.default_rng(seed)

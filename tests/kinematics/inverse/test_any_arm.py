@@ -21,7 +21,7 @@ from kinacc.synthetic.draw import TABLE_II
 
 MH180, UR10, IIWA = (robot.load(name) for name in ("mh180", "ur10", "iiwa14"))
 FANUC = robot.load("fanuc_r2000ic_165f").dh
-COUNT = 15
+COUNT = 10
 SEARCHED = [
     arms.OFFSET_WRIST,
     arms.GENERAL,

@@ -42,7 +42,7 @@ class Arm:
         return np.pad(np.array(self.rows) * [DEG, 1.0, 1.0, DEG], ((0, 0), (0, 1)))
 
     def frames(self, shown: np.ndarray, true: bool = False) -> list[np.ndarray]:
-        """The base frame and the frame after each joint, at joints shown on the pendant (..., 6)."""
+        """The base frame and the frame after each joint, at joints shown (..., 6)."""
         q = shown @ self.matrix.T
         return dh_frames(self.table + true * self.errors, q + true * self.wave * np.sin(2.0 * q))
 

@@ -22,7 +22,7 @@ def seen(arm: Arm, shown: np.ndarray) -> np.ndarray:
     return BASE @ arm.pose(shown, true=True) @ TOOL
 
 
-def write(folder: Path, arm: Arm, poses: int = 90, order: int = 1) -> Path:
+def write(folder: Path, arm: Arm, poses: int = 90, order: int = 1, folds: int = 5) -> Path:
     """A robot file, a file of measured poses and a configuration; the configuration's path."""
     rng = np.random.default_rng(11)
     shown = arm.draw(rng, poses)
@@ -31,7 +31,7 @@ def write(folder: Path, arm: Arm, poses: int = 90, order: int = 1) -> Path:
     config = folder / "arm.yaml"
     config.write_text(
         "datasets: {arm: {robot: robot.yaml}}\n"
-        "measurements: {source: file, folds: 3, file: {path: poses.csv,"
+        f"measurements: {{source: file, folds: {folds}, file: {{path: poses.csv,"
         " orientation: {kind: quaternion}}}\n"
         f"calibration: {{base_and_tool: estimated, vec: {{order: {order}}},"
         " dh: {fit_to: measurements, hayati_joints: auto}}\n"
