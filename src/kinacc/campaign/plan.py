@@ -6,7 +6,7 @@ import json
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, fields
-from functools import cached_property
+from functools import cached_property, lru_cache
 from typing import Annotated, Any, Literal, Self
 
 import numpy as np
@@ -264,6 +264,7 @@ def to_json(plan: Plan) -> bytes:
     return (json.dumps(plan.model_dump(), default=lambda array: array.tolist()) + "\n").encode()
 
 
+@lru_cache(maxsize=4)  # every reading that is added looks at the plan of its campaign three times
 def from_json(text: bytes, where: str) -> Plan:
     """Return the plan written by ``to_json``. Raises InputError where it cannot be read."""
     try:
