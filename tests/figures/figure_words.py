@@ -6,11 +6,11 @@ import numpy as np
 import shared_data
 from matplotlib.figure import Figure
 from matplotlib.text import Text
-from stages_by_hand import tables_in
 
 from kinacc.config.schema import defaults
 from kinacc.figures import save
 from kinacc.figures.paper import draw_figure
+from kinacc.tables import store
 
 RESULTS = shared_data.RESULTS / "mh180"
 NAMES = ("fig1", "fig2", "fig3", "fig4", "fig5", "fig6")
@@ -18,7 +18,8 @@ NAMES = ("fig1", "fig2", "fig3", "fig4", "fig5", "fig6")
 
 def figures(dataset: str, names=NAMES) -> dict[str, Figure]:
     """Each figure as its stage draws it."""
-    tables, settings = tables_in(RESULTS), defaults() | {"dataset": dataset, "robot": "mh180"}
+    tables = {path.stem: store.read(path) for path in RESULTS.glob("*.parquet")}
+    settings = defaults() | {"dataset": dataset, "robot": "mh180"}
     return {name: draw_figure(name, tables, settings) for name in names}
 
 

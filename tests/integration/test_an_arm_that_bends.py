@@ -145,7 +145,7 @@ def deviation(folder: Path, truth: dict[str, dict[int, float]]) -> float:
     )
     table = table.set_index("joint")
     matrix = covariance.pivot(index="parameter", columns="other", values="covariance")
-    matrix = matrix.combine_first(matrix.T)
+    matrix = matrix.fillna(matrix.T)
     planted = {(joint, name): v for name, values in truth.items() for joint, v in values.items()}
     names = [f"j{joint}.{name}" for joint, name in planted]
     error = np.array([table.loc[key] - value for key, value in planted.items()])
