@@ -13,7 +13,7 @@ from kinacc.checks.coverage import few_poses
 from kinacc.config.schema import defaults
 from kinacc.kinematics import robot
 
-SIZES, SUBSETS = (6, 8, 12, 20, 30), 12
+SUBSETS = {6: 12, 8: 12, 12: 4, 20: 4}  # of 12 and more all leave about the same
 
 
 def settings():
@@ -52,9 +52,9 @@ def mean_errors(arm, train, test, *kinds):
 def test_dh_from_few_positions_beats_the_nominal_arm(name, offset_deg):
     arm, seen = positions(name, offset_deg)
     test = seen.select(slice(100, None))
-    for size in SIZES:
+    for size, subsets in SUBSETS.items():
         found = []
-        for subset in range(SUBSETS):
+        for subset in range(subsets):
             rows = np.random.default_rng(100 * size + subset).permutation(100)[:size]
             found.append(mean_errors(arm, seen.select(rows), test, "dh"))
         by_dh, nominal = np.mean(found, axis=0)

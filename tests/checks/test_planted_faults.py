@@ -18,12 +18,12 @@ EVERY, SOME, LATE = plants.every, plants.some, plants.late
 
 @cache
 def good(name):
-    """A good file: measured (every fourth pose of a series will do), or of a simulated arm."""
+    """A good file: measured (every eighth pose of a series will do), or of a simulated arm."""
     if name == "arm":
         return simulated("irb120", poses=80, turned=True)
     if name == "three":
         return simulated("mh180", poses=60, targets=("mA", "mB", "mC"), noise_mm=0.01)
-    return measured("fanuc") if name == "fanuc" else measured("ur10_d").rows(slice(0, 632, 4))
+    return measured("fanuc") if name == "fanuc" else measured("ur10_d").rows(slice(0, 632, 8))
 
 
 def lines(rows):

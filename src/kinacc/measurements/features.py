@@ -30,6 +30,8 @@ def axis_of(cell: object) -> str:
     """X, Y or Z, empty where a cell is none of them."""
     if not isinstance(cell, str) or len(cell) > 40:
         return ""
+    if cell.isascii() and not {*cell.lower()} & {*"xyz"}:
+        return ""  # a number, most of the time
     terms = {*name_of(cell).terms} - WORDS["axis"] or {cell.strip().lower()}
     return terms.pop().upper() if len(terms) == 1 and terms <= {*"xyz"} else ""
 
