@@ -75,6 +75,8 @@ def compare_tables(before: Path, now: Path) -> Iterator[str]:
     name = before.stem if before.stem in ARTEFACTS else before.parent.name
     artefact = ARTEFACTS.get(name)
     old, new = map(store.read_table, (before, now))
+    if old.equals(new):
+        return
     for column in old.columns.symmetric_difference(new.columns):
         yield f"{name}, column {column}: {'missing' if column in old else 'new'}"
     known = {item.name: item for item in artefact.in_file(old.columns)} if artefact else {}
@@ -85,7 +87,7 @@ def compare_tables(before: Path, now: Path) -> Iterator[str]:
         if len(only):
             yield f"{name}: {len(only)} rows {word}, first {_row(key, only[0])}"
     common = old.index.intersection(new.index)
-    old, new = old.loc[common], new.loc[common]
+    old, new = (table.loc[common].reset_index(drop=True) for table in (old, new))
     for column in old.columns.intersection(new.columns).difference(key, sort=False):
         single, second, text = old[column], new[column], ""
         same = (single == second) | (single.isna() & second.isna())
