@@ -10,6 +10,7 @@ from complaints import complaints
 from shared_data import ROOT
 
 from kinacc.checks.configuration import load
+from kinacc.config.reading import mapping
 from kinacc.config.schema import defaults
 
 PAPER = ROOT / "config.yaml"
@@ -157,3 +158,8 @@ def test_all_problems_come_in_one_message(config):
     assert len(found) == 8, found
     lines = [int(text.split("own.yaml:")[1].split(",")[0]) for text in found]
     assert lines == sorted(lines)
+
+
+def test_a_number_with_an_exponent_is_one_unless_it_is_quoted():
+    read = mapping("plain: 1e-3\nquoted: '1e-3'\ntagged: !!str 5", "x").data
+    assert read == {"plain": 1e-3, "quoted": "1e-3", "tagged": "5"}

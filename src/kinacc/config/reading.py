@@ -146,6 +146,8 @@ def _scalar(node: yaml.ScalarNode) -> Any:
     """The value of a node; text where YAML has no plain value for it, or no float holds it."""
     if not node.style and _FLOAT.fullmatch(node.value):
         return float(node.value)
+    if node.tag == "tag:yaml.org,2002:str":
+        return node.value
     try:
         value = yaml.constructor.SafeConstructor().construct_object(node)
     except (ArithmeticError, AttributeError, LookupError, ValueError, yaml.YAMLError):
