@@ -19,9 +19,6 @@ from kinacc.cli.output import Output, answers
 from kinacc.cli.process import AGAINST
 from kinacc.cli.rows import joints_given, numbers_given
 from kinacc.errors import input_error
-from kinacc.figures.save import render
-from kinacc.report.campaign import campaign_page, markdown, section
-from kinacc.report.page import html
 from kinacc.report.rendering import lines as texts
 from kinacc.tables.atomic import require_writable, write_together, write_whole
 from kinacc.tables.store import content_of, to_table
@@ -135,6 +132,11 @@ def report(folder: str, to: str | None, out: Output) -> None:
     Example:
       kinacc campaign report check --page check.html
     """
+    # Plots take half of a start, and other commands draw none.
+    from kinacc.figures.save import render
+    from kinacc.report.campaign import campaign_page, markdown, section
+    from kinacc.report.page import html
+
     campaign = _open(folder)
     opened, into = campaign.opened, Path(to or campaign.folder / "report")
     if not campaign.state.used:

@@ -23,10 +23,8 @@ from kinacc.deployment.folder import read_tables
 from kinacc.errors import InputError, Problem, first_few, input_error
 from kinacc.gate import accepted as accepted_runs
 from kinacc.gate import check, outputs
-from kinacc.report import dataset as pages
 from kinacc.report import summarise as summaries
 from kinacc.report import terminal
-from kinacc.report.page import html
 from kinacc.report.summary import BOUND, HELD_OUT, CalibrationSummary
 from kinacc.tables import store, sums
 from kinacc.tables.atomic import write_whole
@@ -108,6 +106,10 @@ def written(folder: str, out: str | None = None) -> Path:
 
     Raises InputError naming all tables missing.
     """
+    # Plots take half of a start, and other commands draw none.
+    from kinacc.report import dataset as pages
+    from kinacc.report.page import html
+
     place, reason, needed = Path(folder), print_outdated(folder), summaries.PAGE_TABLES
     old = summaries.made_of_others(place) - {Path(_PAGE).stem, *needed}
     optional = [name for name in summaries.ON_PAGE if name not in old]
