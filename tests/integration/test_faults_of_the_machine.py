@@ -86,6 +86,7 @@ def test_a_run_killed_or_stopped_at_any_moment_is_continued_by_the_same_command(
         (FIT, LOG, signal.SIGKILL, -9, 60.0),  # within one
         (CALIBRATE, LOG, signal.SIGINT, 130, 3.0),
         (CALIBRATE, LOG, signal.SIGTERM, 143, 3.0),
+        (CALIBRATE, LOG, signal.SIGKILL, -9, 3.0),
         (BOTH, LOG, signal.SIGINT, 1, 60.0),  # Snakemake waits for a job that it is just beginning
     ):
         forget_fit(folder)
@@ -98,6 +99,7 @@ def test_a_run_killed_or_stopped_at_any_moment_is_continued_by_the_same_command(
         assert time.monotonic() - began < limit_s
         assert tables(folder, wanted).items() <= wanted.items()
     assert (folder / FIRST).exists()
+    assert not (folder / "results/own/summary.parquet").exists()  # no run went on unseen
     ended(folder, FIT)
     assert tables(folder, wanted) == wanted
     assert not [*folder.rglob("*.partial")]

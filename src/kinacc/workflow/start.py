@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-import signal
 import subprocess
 import sys
 from collections.abc import Sequence
@@ -16,6 +15,14 @@ SNAKEFILE = (_INSTALLED if _INSTALLED.is_dir() else Path(__file__).parents[3]) /
 ONE_THREAD = dict.fromkeys(
     ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS", "BLIS_NUM_THREADS"), "1"
 )
+# Snakemake, whose group of processes ends as its standard input is closed: also where the process
+# that started it is killed, or is stopped before it has the number of this one.
+_SNAKEMAKE = """\
+import os, runpy, signal, threading
+stop = lambda: (os.read(0, 1), os.killpg(0, signal.{signal}))
+threading.Thread(target=stop, daemon=True).start()
+runpy.run_module("snakemake", run_name="__main__", alter_sys=True)
+"""
 _PROFILE = SNAKEFILE.parent / "profiles" / "default"
 
 
@@ -32,22 +39,21 @@ def run_workflow(target: str, configs: Sequence[str], cores: int, more: Sequence
     """Exit code of Snakemake after it made a target of the workflow.
 
     ``more`` are options of the user for Snakemake; without any it prints only what goes wrong and
-    the progress of stages. Ctrl-C and SIGTERM end Snakemake and its jobs.
+    the progress of stages. However this process ends, Snakemake and its jobs end with it.
     """
-    command = [sys.executable, "-m", "snakemake", "--snakefile", str(SNAKEFILE)]
+    # Jobs of a cluster have to be cancelled. Here, killed at any moment, a run can go on.
+    elsewhere = any(word.startswith(("--profile", "--executor", "-e")) for word in more)
+    program = _SNAKEMAKE.format(signal="SIGINT" if elsewhere else "SIGKILL")
+    command = [sys.executable, "-c", program, "--snakefile", str(SNAKEFILE)]
     command += ["--cores", str(cores), "--configfile", *configs]
     if "--workflow-profile" not in more:
         command += ["--workflow-profile", str(_PROFILE)]
     command += more or ["--quiet", "all"]
     command += ["--no-hooks", "--", target]
 
-    # A group of its own: Ctrl-C reaches this process alone, which passes it on.
-    with subprocess.Popen(command, process_group=0) as started:
+    # A group of its own: Ctrl-C reaches this process alone.
+    with subprocess.Popen(command, stdin=subprocess.PIPE, process_group=0) as started:
         try:
             return started.wait()
-        except KeyboardInterrupt:
-            # Jobs of a cluster have to be cancelled. Here, killed at any moment, a run can go on.
-            elsewhere = any(word.startswith(("--profile", "--executor", "-e")) for word in more)
-            os.killpg(started.pid, signal.SIGINT if elsewhere else signal.SIGKILL)
-            started.wait()
-            raise
+        finally:
+            started.communicate()  # closes the standard input, and waits
