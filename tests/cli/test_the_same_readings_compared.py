@@ -63,5 +63,6 @@ def test_vec_models_are_compared_only_where_both_say_something(results, tmp_path
     own = joints_of(tmp_path / "own.csv", (0.0,))
     alone = answer(*words, own)
     assert told["shifts"] == alone["shifts"]
+    assert {row["chance_mm"] for row in told["shifts"]} == {None}
     far = joints_of(tmp_path / "far.csv", (400.0,))
     assert call(*words, far).exit_code == 2

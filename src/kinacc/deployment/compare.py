@@ -51,14 +51,14 @@ class Difference:
         The error model compared.
     verdict
         CHANGED; IN_DOUBT where most poses are not near measured poses of both; UNPROVEN; UNKNOWN
-        without covariances; NOT_COMPARABLE (a model without parameters, at such poses);
-        SAME_READINGS; OTHER_ROBOT.
+        without covariances or parameters; NOT_COMPARABLE (a model without parameters, at such
+        poses); SAME_READINGS; OTHER_ROBOT.
     statistic, directions, probability
         Squared distance in the directions that both determine, in units of their covariances, and
         the probability of at least this distance where nothing changed.
     shifts
         Rows "as fitted" and "best base and tool": rms and largest change of flange poses in the
-        base, and the rms by chance (NaN where unknown).
+        base, and the rms by chance (NaN where unknown, as of VEC models).
     parameters
         Rows of fitted or different DH parameters, mm and mrad; ``sigmas`` is NaN where a
         calibration does not determine one (``undetermined``: first, second, both); or None.
@@ -276,9 +276,10 @@ def _scatter(
 ) -> list[np.ndarray]:
     """Movement (n, 6, r) of the flange by one standard deviation of each direction of the fits.
 
-    As fitted, and less what base and end frame absorb; NaN without covariances.
+    As fitted, and less what base and end frame absorb; NaN without covariances or parameters.
     """
-    if any(item.known is None for item in both):
+    # The covariance of a series contains directions that move the flange and no measured pose.
+    if any(item.known is None or item.model.kind not in _BY_PARAMETERS for item in both):
         return [np.full((len(pose.position_mm), 6, 1), np.nan)] * 2
     pairs = zip(both, states, strict=True)
     slopes = [sensitivity(item, state, "base", FLANGE) @ item.root for item, state in pairs]
