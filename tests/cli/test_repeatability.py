@@ -72,16 +72,17 @@ def test_instrument_visits_and_sides_are_separated_as_by_the_analysis_of_varianc
         assert result[name][0] == pytest.approx(end, rel=1e-9)
 
 
-def test_a_campaign_of_readings_like_these_has_the_noise_told_of_them():
+@pytest.mark.parametrize(("side_mm", "files"), [(0.03, 400), (0.0, 100)])
+def test_a_campaign_of_readings_like_these_has_the_noise_told_of_them(side_mm, files):
     """Over many files, unbalanced as people measure: unbiased, with limits that hold in 95 %."""
     from kinacc.checks.repeatability import AXES, limits, noise_of, parts
 
     rng = np.random.default_rng(2)
-    truth, held, sizes = 0.02**2 + 0.05**2 + 0.03**2, 0, []
+    truth, held, sizes = 0.02**2 + 0.05**2 + side_mm**2, 0, []
     side = np.repeat(np.arange(30), 4)
     visit = np.cumsum(np.r_[1, rng.random(119) < 0.7] | np.r_[1, np.diff(side)]) - 1
-    for _ in range(400):
-        shift = rng.normal(size=(30, 3)) * 0.03
+    for _ in range(files):
+        shift = rng.normal(size=(30, 3)) * side_mm
         off = rng.normal(size=(visit[-1] + 1, 3)) * 0.05
         at = shift[side] + off[visit] + rng.normal(size=(120, 3)) * 0.02
         read = pd.DataFrame({"pose": side // 2, "side": side, "visit": visit})
@@ -91,7 +92,7 @@ def test_a_campaign_of_readings_like_these_has_the_noise_told_of_them():
         low, high = limits(np.sqrt([size]), found.freedom)
         held += bool(low[0] ** 2 <= truth <= high[0] ** 2)
     assert np.mean(sizes) == pytest.approx(truth, rel=0.03)
-    assert 0.92 * 400 <= held <= 0.98 * 400
+    assert 0.92 * files <= held <= 0.98 * files
 
 
 def test_poses_that_scatter_differently_are_found_as_by_bartlett(tmp_path):
