@@ -241,11 +241,18 @@ def test_a_joint_that_lost_its_zero_is_named(folder, later):
 
 
 @pytest.mark.parametrize("how", [SAME, MOVED])
-def test_one_wrong_reading_does_not_pass_among_good_ones(folder, later, how):
-    answer = answered(folder[1], later(1.0, 20, wrong=[7]), *how)
+def test_one_wrong_reading_does_not_pass_among_good_ones(folder, later, how, tmp_path):
+    table = tmp_path / "rows.csv"
+    answer = answered(folder[1], later(1.0, 20, wrong=[7]), *how, "-o", table)
     assert answer["verdict"] == "undecided"
     assert answer["test"]["probability"] > 0.01
     assert "line 9," in answer["reason"]
+    rows = pd.read_csv(table)
+    assert rows["near"].sum() == rows["error_mm"].count() == answer["near"]
+    worst = rows.loc[rows["error_mm"].idxmax()]
+    assert (len(rows), worst["row"], worst["far_off"]) == (20, 9, True)
+    assert worst["error_mm"] == pytest.approx(5.0, abs=2.0)
+    assert (rows["far_off"] == (rows["error_mm"] > worst["limit_mm"])).all()
     assert answered(folder[1], later(1.0, 20), *how)["verdict"] == "pass"
 
 

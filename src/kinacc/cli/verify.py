@@ -78,7 +78,7 @@ def verify(
         moved=moved,
     )
     shown = result.errors if out.verbose else result.errors.drop(columns=[*_DETAILS])
-    out.show(result, result.errors, lines, shown)
+    out.show(result, result.rows, lines, shown)
     if code := _EXIT[result.verdict]:
         raise SystemExit(code)
 

@@ -67,6 +67,10 @@ class Verification:
         remaining ones near measured poses, which alone count.
     errors
         A row for each model at the readings that all models cover.
+    rows
+        A row for each reading but the known ones: whether it is near measured poses (``near``),
+        its position error, the limit of held-out errors, and whether the error exceeds it
+        (``far_off``). NaN where not near.
     configurations, held_out
         Number of configurations that count, and of held-out ones.
     test
@@ -83,6 +87,7 @@ class Verification:
     known: int
     near: int
     errors: pd.DataFrame
+    rows: pd.DataFrame
     configurations: int = 0
     held_out: int = 0
     test: PermutationTest | None = None
@@ -135,7 +140,11 @@ def verify(
         raise input_error("the readings", message, "readings of one session")
     table = model_errors(tables, observed, moved, rotation_weight_mm_per_rad)
     fitted = "the calibration was fitted to all of these readings"
-    result = Verification(UNDECIDED, fitted, kind, len(is_known), int(is_known.sum()), 0, table)
+    labels = [name for name in ("row", "pose_name", "target") if name in columns]
+    each = pd.DataFrame({name: columns[name][~is_known] for name in labels})
+    each = each.assign(near=False, error_mm=np.nan, limit_mm=np.nan, far_off=False)
+    counts = len(is_known), int(is_known.sum()), 0
+    result = Verification(UNDECIDED, fitted, kind, *counts, table, each)
     if not len(observed):
         return result
     point = next((name for name in observed.target_names if name in calibration.targets), None)
@@ -143,6 +152,7 @@ def verify(
     held_out = _held_out(tables, calibration, observed, moved)
     rows = _whole_configurations(observed, near)
     near_count, held_out_count = int(near.sum()), len(held_out.columns)
+    each["near"] = near
     result = replace(result, near=near_count, configurations=len(rows), held_out=held_out_count)
     obstacles = {
         SET_UP_MOVED: not moved and table["mean_mm"].min() > _FAR_MM,
@@ -157,12 +167,17 @@ def verify(
     calibration = _at_session(tables, kind, new, moved)
     frames = frames_at(calibration, new, moved, rotation_weight_mm_per_rad)
     off_mm = errors_of(calibration, frames, new)[:, :3]
+    near_mm = errors_of(calibration, frames, observed.select(near))[:, :3]
+    known_mm = np.linalg.norm(held_out.columns[..., -1].reshape(-1, 3), axis=1)
+    each.loc[near, "error_mm"] = np.linalg.norm(near_mm, axis=1)
+    each["limit_mm"] = tails.limit(known_mm, 3, near_count)
+    each["far_off"] = each["error_mm"] > each["limit_mm"]
     fresh = error_columns(model, robot, new, frames.targets, moved, off_mm)
     if fresh.columns[..., -1].size <= fresh.rank:
         return replace(result, reason="base and tool explain all that these poses show")
     test, (factor, offsets) = compare(held_out, fresh), smallest_changes(held_out, len(rows))
     verdict = FAIL if test.probability <= LEVEL else PASS
-    reason = _far_off(columns["row"][~is_known][rows.ravel()], off_mm, held_out, columns)
+    reason = _far_off(each, columns)
     if not reason and factor > DOUBLED:
         reason = f"{len(rows)} configurations near measured poses are too few to show errors "
         reason += f"{DOUBLED:g} times as large; measure more"
@@ -180,23 +195,20 @@ def verify(
     )
 
 
-def _far_off(
-    lines: np.ndarray, off_mm: np.ndarray, held_out: ErrorColumns, columns: Columns
-) -> str:
+def _far_off(rows: pd.DataFrame, columns: Columns) -> str:
     """Readings whose errors exceed the limit of held-out errors, in words; empty if none do.
 
     The permutation test does not detect one wrong reading among sound ones: its random samples
     contain that reading too.
     """
-    sizes_mm = np.linalg.norm(off_mm, axis=1)
-    known_mm = np.linalg.norm(held_out.columns[..., -1].reshape(-1, 3), axis=1)
-    limit_mm = tails.limit(known_mm, 3, len(sizes_mm))
-    if not (count := int(np.sum(sizes_mm > limit_mm))):
+    far = rows[rows["far_off"]].sort_values("error_mm")
+    if far.empty:
         return ""
-    worst = RowNames.of_columns(columns).one(lines[np.argmax(sizes_mm)])
+    *_, worst = far.itertuples()
     return (
-        f"errors of {count} of {len(sizes_mm)} readings exceed the limit of held-out errors, "
-        f"{limit_mm:.3g} mm; largest: {worst}, {sizes_mm.max():.3g} mm; measure again"
+        f"errors of {len(far)} of {rows['near'].sum()} readings exceed the limit of held-out "
+        f"errors, {worst.limit_mm:.3g} mm; largest: {RowNames.of_columns(columns).one(worst.row)}, "
+        f"{worst.error_mm:.3g} mm; measure again"
     )
 
 
