@@ -245,7 +245,12 @@ class Calibration:
         return programs.compensate_program(self.model, path, **options)
 
     def save(self, folder: str | Path) -> Path:
-        """Write all tables to a results folder that commands and :func:`load_calibration` read."""
+        """Write all tables to a results folder that commands and :func:`load_calibration` read.
+
+        ``kinacc verify FILE`` reads a later file as the data set's configuration states: save to
+        ``results/NAME`` beside that (NAME is the data set). Elsewhere give the .yaml that ``kinacc
+        init FILE`` writes.
+        """
         folder = Path(folder)
         (folder / sums.FOLDER).mkdir(parents=True, exist_ok=True)
         marks = {**_MARKS, "config_hash": self.config_hash}
@@ -342,7 +347,8 @@ def read_measurements(
     ----------
     paths
         A file with joints and measured points (CSV, text, Excel, Parquet), or two files, one of
-        each; or a configuration file (.yaml), as ``kinacc init`` writes it.
+        each, with 6 poses or more, as base and tool are fitted to check them; or a configuration
+        file (.yaml), as ``kinacc init`` writes it, which reads any number of poses.
     robot
         Of measured files: a shipped name, a robot file or a URDF file. [the shipped robot that
         fits]
@@ -461,7 +467,8 @@ def verify(
     calibration
         The calibration.
     readings
-        New readings, 10 to 20 configurations.
+        New readings, 10 to 20 configurations. A file like that of the calibration:
+        ``read_measurements("tracker.yaml", settings={"measurements": {"file": {"path": FILE}}})``.
     base, tool
         Whether instrument and target stand as they did (``same``) or were set up anew
         (``moved``): what moved is fitted to the readings.

@@ -114,7 +114,8 @@ def check(reading: MeasuredFile, section: Settings, robot: Robot) -> Report:
     stated = Layout.of(section).orientation
     every = readings.of_file(reading, robot)
     if (count := len(np.unique(every.pose))) < _FEWEST_POSES:
-        raise input_error(section["path"], f"{count} poses", f"at least {_FEWEST_POSES}")
+        allowed = f"at least {_FEWEST_POSES}, as base and tool are fitted to check the readings"
+        raise input_error(section["path"], f"{count} poses", allowed)
     between = distances.distances(every)
     by_distances, renamed = distances.compared(every, between)
     single, away_mm = readings.merged(renamed)

@@ -103,7 +103,8 @@ def like_those_of(folder: Path, readings: Path) -> dict[str, Any]:
         if measurements["source"] == "file" and not file["joints"]["path"]:
             return {**settings, "measurements": {**measurements, "folds": None, "file": file}}
     message = f"no configuration beside the results states how one file of {folder.name} is read"
-    fix = f"describe it: kinacc init {readings}; then give its .yaml in place of {readings}"
+    fix = f"describe it: kinacc init {readings}; then give its .yaml in place of {readings}; "
+    fix += "or keep the results as results/NAME, by the name of the data set, beside its .yaml"
     raise input_error(str(readings), message, fix=fix)
 
 
