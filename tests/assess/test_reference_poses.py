@@ -102,6 +102,15 @@ def test_a_change_is_what_least_squares_make_of_the_references(covariance, shape
     assert find_change(plan, Readings(*(column[:14] for column in readings))) is None
 
 
+@pytest.mark.parametrize("before", [5, 20])  # of 25 readings: a round of five, all but a round
+def test_a_step_beside_a_single_round_is_named(before):
+    plan = schedule(300, 200, 20)
+    place = np.array(sorted(plan.row_at))
+    step = read(plan, np.random.default_rng(5), lambda time: 20.0 * (time >= place[before] / 300))
+    between = find_change(plan, step).between
+    assert between == (place[before - 1] + 1, place[before] + 1)
+
+
 @pytest.mark.parametrize("freedom", [math.inf, 0.0, 60.0])
 def test_references_without_a_change_alarm_as_rarely_as_stated(freedom):
     plan, rng = schedule(200, 180, 20), np.random.default_rng(11)

@@ -64,7 +64,7 @@ class Campaign:
     --------
     >>> import kinacc
     >>> calibration = kinacc.load_calibration("results/tracker")  # doctest: +SKIP
-    >>> candidates = calibration.table("measurements")[joints].to_numpy()  # doctest: +SKIP
+    >>> candidates = np.deg2rad(np.loadtxt("new_poses.csv", delimiter=","))  # doctest: +SKIP
     >>> campaign = kinacc.Campaign.start("check", calibration, candidates, 0.03)  # doctest: +SKIP
     >>> pose = campaign.next_pose()  # doctest: +SKIP
     >>> campaign.add_reading([812.31, -40.02, 655.90])  # doctest: +SKIP

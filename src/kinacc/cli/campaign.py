@@ -140,7 +140,7 @@ def report(folder: str, to: str | None, out: Output) -> None:
     campaign = _open(folder)
     opened, into = campaign.opened, Path(to or campaign.folder / "report")
     if not campaign.state.used:
-        raise input_error(folder, "no reading was requested and taken yet")
+        raise input_error(folder, "has no reading yet", fix="kinacc campaign next, then record")
     tables, metadata = reports.tables(opened), folders.marks_of(opened)
     part = section(opened, tables)
     contents: dict[Path | str, bytes] = {

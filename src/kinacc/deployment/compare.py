@@ -27,7 +27,7 @@ from kinacc.kinematics.model import JointState
 
 OTHER_ROBOT, SAME_READINGS = "different robots", "same readings"
 NOT_COMPARABLE, UNKNOWN = "not comparable here", "unknown"
-UNPROVEN, IN_DOUBT, CHANGED = "no change proven", "change in doubt", "changed"
+UNPROVEN, IN_DOUBT, CHANGED = "change not proven", "change in doubt", "changed"
 ROUNDING = 1e-9  # mm and mrad
 _SPAN = 1e-3  # directions closer than this are one
 _TOUCHED = 1e-4  # 1 % of a parameter in an undetermined direction
