@@ -6,6 +6,7 @@ import math
 
 import numpy as np
 import pytest
+from numpy.testing import assert_allclose
 from scipy.stats import binom, chi2, f, kstest, multivariate_t, norm, t
 from simulated_campaigns import away, conducted, equal
 
@@ -229,6 +230,22 @@ def test_a_noise_that_is_not_known_is_taken_from_where_it_can_be_had(
     lower, upper = np.max([*campaign.point_limits().values()], axis=0)
     assert lower <= 8.0 <= upper
     assert (lower > 0.0) != ("wrong_rate" in settings)  # any single reading may be wrong
+
+
+def test_lower_limits_of_points_spend_half_their_error_on_the_limit_of_a_tested_noise():
+    """As with known noise (1.2 times what is stated) as large as that limit, and half the error."""
+    rng = np.random.default_rng(5)
+    readings = away(rng, np.full(20, 8.0)) + rng.normal(size=(20, 3))
+    largest = math.sqrt(60.0 / chi2.ppf(0.5 * 0.05 * 0.05, 60))  # single points: 5 % of 5 %
+
+    def lower(noise_mm, **settings):
+        begun = SearchAndConfirm(60, **settings).begin(equal(20, noise_mm))
+        carry_on(begun, lambda row, _: readings[row], limit=20)
+        return [begun.point_limits()[row][0] for row in range(20)]
+
+    tested = lower(1.0, noise="estimated", noise_freedom=60)
+    assert max(tested) > 3.0
+    assert_allclose(tested, lower(largest / 1.2, confidence=0.975), rtol=1e-9)
 
 
 def test_a_noise_that_is_not_estimated_yet_withholds_bounds_and_limits():
