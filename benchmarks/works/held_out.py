@@ -78,7 +78,7 @@ def _kinacc(seen: Observations, estimator: Estimator):
             out = seen.fold == fold
             fits = fit_all(seen.select(~out), [estimator.chosen(tables, fold)])
             held_out = errors(fits, seen.select(out))[f"{estimator.kind}_vs_measured"]
-            error_mm[out] = np.linalg.norm(held_out.position_mm, axis=1)
+            error_mm[out] = np.linalg.norm(held_out[:, :3], axis=1)
         return Held(float(error_mm.mean()))
 
     return run

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import re
 from types import SimpleNamespace
 
@@ -170,3 +171,24 @@ def test_a_page_on_thirty_thousand_rows_can_still_be_mailed(tables):
     tables["measurements"] = dict(pd.concat([measured] * times, ignore_index=True))
     tables["pose_errors"] = dict(pd.concat(many, ignore_index=True))
     assert len(as_page(fit_sections.residuals(tables, known)).encode()) < 4_000_000
+
+
+def test_parts_of_a_chart_are_defined_before_they_are_referred_to(tables):
+    """In the order of the text: a browser draws no chart otherwise."""
+    page = as_page(fit_sections.residuals(tables, summarise(RESULTS, tables, campaigns=())))
+    charts = json.loads(re.search(r'id="charts">(.*?)</script>', page)[1])
+    defined, referred = set(), 0
+
+    def follow(value):
+        nonlocal referred
+        if isinstance(value, dict) and set(value) == {"id"}:
+            assert value["id"] in defined
+            referred += 1
+        elif isinstance(value, dict) and value.get("type") == "object":
+            defined.add(value["id"])
+        for part in value.values() if isinstance(value, dict) else value:
+            if isinstance(part, (dict, list)):
+                follow(part)
+
+    follow(charts)
+    assert referred > 10

@@ -58,6 +58,8 @@ def environment(is_page: bool = True) -> Environment:
         lstrip_blocks=True,
         finalize=None if is_page else _in_line,
     )
+    # Charts refer to models defined before: sorted by name they would not.
+    templates.policies["json.dumps_kwargs"] = {}
     filters = {"cell": cell, "counted": counted, "few": few, "size": size}
     templates.filters |= filters | {"md": in_markdown, "model": model_name, "quoted": quote}
     return templates
