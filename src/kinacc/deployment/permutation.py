@@ -11,7 +11,6 @@ and tool are fitted to every sample as to the new configurations.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
@@ -144,18 +143,11 @@ def _statistics(sums: np.ndarray, like: ErrorColumns) -> _Statistics:
 
 def _samples(products: np.ndarray, size: int) -> np.ndarray:
     """Mean products (draws, q, q) of random samples without repeats."""
-    weight = _chosen(_DRAWS, len(products), size)
-    sums = weight @ products.reshape(len(products), -1)
-    return sums.reshape(len(weight), *products.shape[1:]) / size
-
-
-@lru_cache(maxsize=1)
-def _chosen(draws: int, total: int, size: int) -> np.ndarray:
-    """Which of ``total`` configurations are in each random sample, 1 or 0, (draws, total)."""
-    order = np.random.default_rng(0).random((draws, total))
-    weight = np.zeros((draws, total))
-    np.put_along_axis(weight, np.argpartition(order, size - 1, axis=1)[:, :size], 1.0, axis=1)
-    return weight
+    rng, total = np.random.default_rng(0), len(products)
+    weight = np.zeros((_DRAWS, total))
+    chosen = np.argpartition(rng.random((_DRAWS, total)), size - 1, axis=1)[:, :size]
+    np.put_along_axis(weight, chosen, 1.0, axis=1)
+    return (weight @ products.reshape(total, -1)).reshape(_DRAWS, *products.shape[1:]) / size
 
 
 def _inverse(products: np.ndarray, least: float = 0.0) -> np.ndarray:
