@@ -313,7 +313,7 @@ def left_jacobians(w_rad: np.ndarray) -> np.ndarray:
 
 
 _START_RCOND = 1e-3  # weaker directions of the start are left at zero for the fit to find
-_TINY_MM = 1e-12
+_TINY_MM = 1e-12  # points all in one place are not scaled
 _LEVER_MM = 100.0  # one radian of orientation counts as much as a point this far away
 
 

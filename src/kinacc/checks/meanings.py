@@ -80,11 +80,11 @@ def read_as(few: Readings, robot: Robot, ways: Sequence[Changes]) -> list[Meanin
     """The meanings of a few readings under each of ``ways``: changes one after the other."""
     read = [changed(few, applied) for applied in ways]
     by_arm = stacked([dh.forward(robot.dh, item.q_rad) for item in read])
-    found = placed(few, by_arm, np.stack([item.position_mm for item in read]))
+    found = base_and_target(few, by_arm, np.stack([item.position_mm for item in read]))
     return [Meaning(*item) for item in zip(ways, read, *found, strict=True)]
 
 
-def placed(few: Readings, by_arm: Pose, position_mm: ndarray) -> tuple[ndarray, ndarray]:
+def base_and_target(few: Readings, by_arm: Pose, position_mm: ndarray) -> tuple[ndarray, ndarray]:
     """Base and target alone, fitted to each of B sets of flanges and positions (B, n, 3).
 
     Turns (B, n, 3, 3) of the flange in the instrument's frame, and misfits (B,) as shares of the

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from kinacc.calibration.frames import stacked
-from kinacc.checks.meanings import largest_session, placed
+from kinacc.checks.meanings import base_and_target, largest_session
 from kinacc.checks.readings import Readings, thinned
 from kinacc.kinematics import dh
 from kinacc.kinematics import robot as robots
@@ -27,7 +27,7 @@ def misfits(merged: Readings) -> list[tuple[float, str]]:
     if not arms:
         return []
     by_arm = stacked([dh.forward(arm.dh, arm.dh_joints(few.q)) for arm in arms])
-    _, shares = placed(few, by_arm, np.stack([few.position_mm] * len(arms)))
+    _, shares = base_and_target(few, by_arm, np.stack([few.position_mm] * len(arms)))
     return sorted(zip(shares.tolist(), [arm.name for arm in arms], strict=True))
 
 
