@@ -143,7 +143,7 @@ class Ledger:
         if point in self.unplanned:
             spread = np.linalg.inv(self._weight[point])
             spread = 0.5 * (spread + spread.T)
-        else:
+        else:  # all of one covariance: a quarter of a simulated campaign's time was the inverses
             spread = covariance / self.count[point]
         self.spread_mm2[point] = spread
         self.mean_mm[point] = spread @ self._weighted[point]

@@ -102,9 +102,9 @@ def like_those_of(folder: Path, readings: Path) -> dict[str, Any]:
         file = {**measurements["file"], "path": str(readings), "source": None, "exclude": []}
         if measurements["source"] == "file" and not file["joints"]["path"]:
             return {**settings, "measurements": {**measurements, "folds": None, "file": file}}
-    message = f"no configuration beside the results states how one file of {folder.name} is read"
-    fix = f"describe it: kinacc init {readings}; then give its .yaml in place of {readings}; "
-    fix += "or keep the results as results/NAME, by the name of the data set, beside its .yaml"
+    message = f"no configuration beside the results says how a file of {folder.name} is read"
+    fix = f"kinacc init {readings}, and give the .yaml that it writes; or keep the results in "
+    fix += "results/NAME beside the .yaml of data set NAME"
     raise input_error(str(readings), message, fix=fix)
 
 
